@@ -1,4 +1,4 @@
-//! Two backends on the same scene, step by step: how far apart they are, and where that began.
+//! Compares two backends on the same scene, step by step: the size of their difference, and its first place.
 
 use crate::backend::Backend;
 use crate::config::SolverConfig;
@@ -10,11 +10,11 @@ use crate::scenes::Spawners;
 use crate::simulation::Simulation;
 use crate::world::{Body, World};
 
-/// How far two worlds are apart.
+/// The difference between two worlds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Difference {
-    /// Bodies of which any number differs in any bit.
+    /// Number of bodies with any bit that differs.
     pub bodies: usize,
     /// Largest difference of a coordinate of a position (m).
     pub position: f64,
@@ -27,7 +27,8 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Between two worlds. NaN on one side only makes a difference of infinity. A body that is in one world only differs.
+    /// The difference between two worlds. NaN on one side only counts as an infinite difference. A body in only one of
+    /// the worlds differs.
     pub fn between(a: &World, b: &World) -> Self {
         let mut all = Self::default();
         for (i, (body_a, body_b)) in a.bodies.iter().zip(&b.bodies).enumerate() {
@@ -79,15 +80,16 @@ const QUANTITIES: [&str; 13] = [
     "angular velocity.z",
 ];
 
-/// A number of a body that is not the same in two worlds.
+/// A number of a body that differs between two worlds.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct BodyDifference {
     /// Index of the body.
     pub body: usize,
-    /// The number: `position.x`; `presence` where the body is in one world only, or another body has its index.
+    /// The name of the number, for example `position.x`. It is `presence` if the body is in only one world, or if
+    /// another body has its index.
     pub quantity: &'static str,
-    /// The number in each world; for a presence 1 where a body has this index and 0 where none has.
+    /// The number in each world. For `presence` it is 1 if a body has this index, and 0 if none has.
     pub values: [f32; 2],
 }
 
@@ -126,39 +128,39 @@ fn distance(x: f32, y: f32) -> f64 {
     }
 }
 
-/// Where two backends first disagree.
+/// The first place at which two backends disagree.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FirstDifference {
-    /// Step, from 1.
+    /// Number of the step, from 1.
     pub step: u32,
     /// The first number that differs after that step.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub body: BodyDifference,
-    /// Where in that step.
+    /// The stage of that step.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub stage: Stage,
 }
 
-/// The first stage of a step whose results are not the same.
+/// The first stage of a step with different results.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(untagged))]
 pub enum Stage {
-    /// Before the first pass: the backends were given different rows.
+    /// Before the first pass: the backends got different rows.
     Rows {
         /// The field of the problem.
         rows: &'static str,
     },
-    /// A pass, given the same rows.
+    /// A pass that got the same rows on both backends.
     Pass {
-        /// Its place in that step's plan, from 0.
+        /// Index of the pass in the plan of the step, from 0.
         pass: usize,
-        /// Passes in the plan.
+        /// Number of passes in the plan.
         passes: usize,
-        /// Its kernel.
+        /// Name of the kernel.
         kernel: String,
     },
-    /// The difference did not appear when the run was repeated: the same input gives other bits.
+    /// The difference did not appear when the run was repeated: the same input gives different bits.
     NotRepeated {
         /// Always true.
         not_repeated: bool,
@@ -172,7 +174,7 @@ impl std::fmt::Display for FirstDifference {
             Stage::Rows { rows } => write!(f, "before the first pass: {rows} of the problem"),
             Stage::Pass { pass, passes, kernel } => write!(f, "pass {pass} of {passes}, {kernel}"),
             Stage::NotRepeated { .. } => {
-                write!(f, "which did not differ when it was repeated: the same input gives other bits")
+                write!(f, "which did not differ when it was repeated: the same input gives different bits")
             }
         }
     }
@@ -182,9 +184,9 @@ impl std::fmt::Display for FirstDifference {
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Comparison {
-    /// After each step.
+    /// The difference after each step.
     pub steps: Vec<Difference>,
-    /// Where it began, if anywhere. A difference that is gone after later steps stays one.
+    /// The first place of a difference, if there was one. It remains even if later steps have no difference.
     pub first: Option<FirstDifference>,
 }
 
@@ -195,7 +197,8 @@ impl Comparison {
     }
 }
 
-/// Runs `scene` on two backends for `steps` steps, each from its own results, and calls `after_step` after each.
+/// Runs `scene` on two backends for `steps` steps. Each backend continues from its own results. Calls `after_step`
+/// after each step.
 ///
 /// # Errors
 /// A backend cannot run, or loses its device.
@@ -215,7 +218,7 @@ pub fn compare(
     for _ in 0..steps {
         for (simulation, spawners) in simulations.iter_mut().zip(&mut spawners) {
             spawners.before_step(&mut simulation.world, scene.dt);
-            // Another backend would be compared from here on.
+            // After a fault, another backend would be compared.
             if let Some(fault) = simulation.step(scene.dt)?.fault {
                 return Err(Error::Lost(fault));
             }
@@ -232,7 +235,7 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// Where two backends part in the step that follows `before` others, on simulations of their own.
+/// The first stage at which two backends differ in the step after `before` other steps, on new simulations.
 fn first_stage(
     scene: &Scene,
     config: &SolverConfig,
@@ -263,14 +266,14 @@ fn first_stage(
     })
 }
 
-/// The first field in which two problems differ in any bit.
+/// The first field of two problems that differs in any bit.
 fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
     fields(a).into_iter().zip(fields(b)).find(|(a, b)| a.1 != b.1).map(|(a, _)| a.0)
 }
 
 /// All fields of a problem, as bytes.
 fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 25] {
-    // A field that is added has to be named here.
+    // This pattern makes a new field a compile error until it is listed here.
     let StepProblem {
         params,
         bodies,
@@ -323,7 +326,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 25] {
     ]
 }
 
-/// The first pass after which two backends disagree on `problem` in any bit that they give back; by bisection.
+/// The first pass after which the results of two backends for `problem` differ in any bit, by bisection.
 ///
 /// # Errors
 /// A backend cannot run.

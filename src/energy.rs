@@ -1,10 +1,12 @@
-//! The law that constraints make no energy: contacts, joints, their springs, limits and preloads only pass energy on or take it. What a step
-//! adds to the kinetic energy of an island is at most the work of gravity, forces and drives, and what the springs of joints and contacts give
-//! back. Velocities that have more are brought back to that energy; momentum stays where nothing outside holds the island.
+//! The law that constraints add no energy: contacts, joints, their springs, limits and preloads only transfer or remove
+//! energy. A step adds to the kinetic energy of an island at most the work of gravity, forces and drives, plus the
+//! energy that the springs of joints and contacts give back. If an island has more, its velocities are reduced to that
+//! energy. Momentum is conserved unless something outside holds the island.
 //!
-//! A constraint whose impulse J changes velocities from v to v' adds J·(v + v')/2 to the kinetic energy, so that work counts at mean velocities.
-//! An island that made energy and whose bodies went further than they could was torn apart within the step: that step is not taken, and the next
-//! one has shorter substeps. Derivation: docs/derivation.md, section 11.
+//! A constraint with the impulse J that changes velocities from v to v' adds J·(v + v')/2 to the kinetic energy, so
+//! work counts at mean velocities. If an island gained energy and its bodies moved further than they could, it was torn
+//! apart within the step. That step is refused: the bodies stay, and the next step has shorter substeps. Derivation:
+//! docs/derivation.md, section 11.
 
 mod springs;
 
@@ -20,36 +22,37 @@ use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
 
-/// The share of its kinetic energy that an island may regain of what it lost, and the share of the weight of a body over its size.
+/// First, the share of its kinetic energy that an island can regain of its earlier losses. Second, the same for the
+/// weight of a body times its size.
 const REGAINED: f64 = 1e-3;
 const ROUNDING: f64 = 1e-6;
-/// The most substeps of 1/60 s that add to velocities and not to changes of them.
+/// Largest number of substeps in 1/60 s that add to velocities and not to changes of them.
 const MOST_ROUNDINGS: f64 = 16.0;
 
-/// The share of its energy that an island with joints may make in a step without shorter substeps from then on.
+/// Share of its energy that an island with joints can gain in a step before it takes shorter substeps.
 const COARSE: f64 = 0.1;
-/// What shorter substeps have to leave of that share before an island takes them again. Joints and contacts that push against each other make the more,
-/// the shorter the substeps are.
+/// Shorter substeps have to reduce that share to this fraction before an island takes them again. If joints and
+/// contacts push against each other, shorter substeps make the gain larger.
 const HELPS: f32 = 0.5;
 
-/// The accounts of all islands.
+/// The energy accounts of all islands.
 #[derive(Debug, Default)]
 pub struct Energy {
-    /// Body by body.
+    /// One entry for each body.
     kept: Vec<Kept>,
     entries: Vec<Entry>,
-    /// The islands that contacts and joints make, each with its account.
+    /// The islands of contacts and joints, each with its account.
     islands: Islands,
     accounts: Vec<Account>,
-    /// The island of each body; [`UNTOUCHED`] of one that nothing touches.
+    /// The island of each body; [`UNTOUCHED`] for a body without contacts and joints.
     numbers: Vec<u32>,
-    /// Whether the islands are those of the contacts of this step.
+    /// Whether the islands include the contacts of this step.
     are_known: bool,
-    /// The bodies of islands that made energy, each after its island.
+    /// The bodies of islands that gained energy, sorted by island.
     members: Vec<(u32, u32)>,
     /// Whether a joint holds each body.
     jointed: Vec<bool>,
-    /// Bodies that are new in this step, or whose joints are.
+    /// Bodies that are new in this step, or that have new joints.
     fresh: Vec<usize>,
 }
 
@@ -64,45 +67,47 @@ impl Clone for Energy {
     }
 }
 
-/// The island of a body that no contact and no joint touches.
+/// The island of a body without contacts and joints.
 const UNTOUCHED: u32 = u32::MAX;
 
-/// What a body keeps from step to step (J).
+/// The energies that a body keeps from step to step (J).
 #[derive(Clone, Copy, Debug, Default)]
 struct Kept {
-    /// What it may regain of what was lost.
+    /// The part of its losses that it can regain.
     reserve: f32,
-    /// What the springs of its joints and of their bodies hold.
+    /// The energy in the springs of its joints, and of the contacts of jointed bodies.
     springs: f32,
-    /// The share of its energy that its island made when it last took shorter substeps for that; 0 before.
+    /// The gain, as a share of the island's energy, when the island last took shorter substeps because of it; 0 before.
     made: f32,
 }
 
 crate::saved::fields!(Kept { reserve, springs, made });
 
-/// What a body, or an island, has in a step (J).
+/// The energies of a body, or of an island, in a step (J).
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry {
-    /// Kinetic energy when the step began, and at its end.
+    /// Kinetic energy at the start of the step, and at its end.
     before: f64,
     after: f64,
     /// Work of gravity, forces and drives.
     work: f64,
-    /// What may be regained of what was lost before, and the most of that from this step on.
+    /// The part of earlier losses that can be regained, and the largest such part from this step on.
     reserve: f64,
     slack: f64,
-    /// What was kept by the springs of joints, and of contacts of bodies on joints, and what they hold now, with the energy of lent inertia.
+    /// Energy that the springs of joints, and of contacts of jointed bodies, held before; and the energy that they hold
+    /// now, including the energy of lent inertia.
     kept: f64,
     springs: f64,
-    /// What is as slow as this counts as rest.
+    /// Kinetic energy below which motion counts as rest.
     rest: f64,
-    /// What the rounding of velocities may add in this step.
+    /// Energy that rounding of velocities can add in this step.
     rounding: f64,
     /// The longest lever of a joint (m).
     lever: f64,
 }
 
-/// What bodies have in common: mass (kg), momentum before and after (kg m/s), force (N), and mass times their ways (kg m).
+/// Common motion of some bodies: mass (kg), momentum before and after (kg m/s), force (N), and mass times displacement
+/// (kg m).
 #[derive(Clone, Copy, Debug, Default)]
 struct Common {
     mass: f64,
@@ -121,12 +126,12 @@ impl Common {
 }
 
 impl Entry {
-    /// What motion leaves; below zero where constraints made energy.
+    /// Energy that the motion lost; below zero if constraints added energy.
     fn left(&self) -> f64 {
         self.given() - self.after
     }
 
-    /// What motion had, and got.
+    /// Energy that the motion had at the start and received.
     fn given(&self) -> f64 {
         self.before + self.work + self.reserve + self.kept
     }
@@ -144,38 +149,39 @@ impl Entry {
         self.lever = self.lever.max(other.lever);
     }
 
-    /// Leaves out the motion that all have in common: nothing within changes it.
+    /// Subtracts the common motion of all bodies, which no internal impulse changes.
     fn leave_out(&mut self, Common { mass, momenta, force, moved }: Common) {
         let [before, after] = momenta.map(|momentum| 0.5 * momentum.length_squared() / mass);
         let whole = self.before.max(f64::MIN_POSITIVE);
         (self.before, self.after) = (self.before - before, self.after - after);
         self.work -= force.dot(moved) / mass;
-        // Rounding of the velocity of all acts on the motion beside it.
+        // Rounding of the total velocity affects the relative motion.
         self.rounding *= (self.before.max(0.0) / whole).sqrt().min(1.0);
         self.slack = REGAINED * self.after.max(0.0) + self.rest;
         self.reserve = self.reserve.min(self.slack);
     }
 }
 
-/// What an island has.
+/// The account of an island.
 #[derive(Clone, Copy, Debug, Default)]
 struct Account {
     all: Entry,
     mass: f64,
-    /// The common motion of its bodies, where nothing holds them.
+    /// The common motion of its bodies, if nothing outside holds them.
     common: Common,
-    /// What the springs of its contacts gave back, and the energy of what they push out (J).
+    /// Energy that the springs of its contacts gave back, and energy that they held at the start of the step (J).
     released: f64,
     pushed: f64,
-    /// Whether anything but its bodies holds it.
+    /// Whether anything outside the island holds it.
     is_held: bool,
     is_refused: bool,
-    /// The share of the energy of their springs that its bodies keep, and their reserve by mass (J/kg).
+    /// The share of spring energy that its bodies keep, and their reserve per mass (J/kg).
     shares: [f64; 2],
 }
 
 impl Account {
-    /// What constraints made: not above 0 where motion is as slow as rest, or no faster than what is pushed out.
+    /// Energy that constraints added. It is not above 0 if the motion is as slow as rest, or has no more energy than
+    /// the springs of contacts can push out.
     fn made(&self) -> f64 {
         let made = -(self.all.left() + self.released + self.all.rounding);
         made.min(self.all.after - self.pushed.max(self.all.rest))
@@ -187,12 +193,12 @@ impl Account {
     }
 }
 
-/// What the law changed in a step.
+/// The changes of a step by the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Taken {
-    /// Energy that constraints had made (J).
+    /// Energy that constraints had added (J).
     pub energy: f64,
-    /// Islands whose step was not taken.
+    /// Number of islands whose step was refused.
     pub refused: usize,
 }
 
@@ -216,12 +222,12 @@ impl Saved for Energy {
 }
 
 impl Energy {
-    /// Takes over that contacts came or went.
+    /// Records that contacts were added or removed.
     pub fn follow_contacts(&mut self) {
         self.are_known = false;
     }
 
-    /// Takes over bodies that came, went, or changed kind, groups or shapes.
+    /// Updates bodies that were added or removed, or that changed kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         self.kept.resize(world.bodies.len(), Kept::default());
         for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
@@ -230,12 +236,12 @@ impl Energy {
         }
     }
 
-    /// Takes over the joints of a body that began or changed.
+    /// Updates the joints of a body that are new or changed.
     pub fn follow_joints_of(&mut self, body: usize) {
         self.fresh.push(body);
     }
 
-    /// Holds the law over the step of `dt` seconds that `problem` has run; `world` is as the step found it.
+    /// Applies the law to the step of `dt` seconds that `problem` has run. `world` is the world before the step.
     pub fn hold(
         &mut self,
         world: &World,
@@ -282,28 +288,28 @@ impl Energy {
         for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
             let [springs, reserve] =
                 self.accounts.get(number as usize).map(|account| account.shares).unwrap_or_default();
-            // An exploded step may leave springs at NaN.
+            // An exploded step can leave springs at NaN.
             kept.springs = if springs > 0.0 { (springs * self.entries[i].springs) as f32 } else { 0.0 };
             kept.reserve = (reserve * f64::from(world.bodies[i].mass.mass)) as f32;
         }
         taken
     }
 
-    /// Adds the energy of the inertia that joints lent to bodies in this step to that of their springs: it counts only as far as motion lost it, since
-    /// the inertia is gone in the next step.
+    /// Adds the energy of the inertia that joints lent to bodies in this step to the energy of their springs. It counts
+    /// only as far as the motion lost it, because the lent inertia is gone in the next step.
     fn add_lent_inertia(&mut self, world: &World, problem: &StepProblem) {
         for row in &problem.turning {
             let i = row.body as usize;
             let (body, entry) = (&world.bodies[i], &mut self.entries[i]);
             let inertia = InverseMass::of(&problem.masses[i]).inertia.as_dmat3().inverse();
             let lent = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
-            // The inertia turns with the body.
+            // The inertia rotates with the body.
             let spin = (turn_of(&problem.bodies[i]).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
             entry.springs += (0.5 * spin.dot(lent * spin)).max(0.0);
         }
     }
 
-    /// Finds the islands of bodies that contacts and joints hold together.
+    /// Finds the islands of bodies that contacts and joints connect.
     fn join(&mut self, problem: &StepProblem) {
         let joints = problem.rows_of(&problem.joint_colors());
         if self.are_known && joints.is_empty() {
@@ -311,7 +317,7 @@ impl Energy {
         }
         let Self { islands, accounts, numbers, entries, .. } = self;
         islands.reset(entries.len());
-        // First whether what touches a body holds it.
+        // First find out whether a fixed or driven body holds each body.
         const HELD: u32 = 0;
         const FREE: u32 = 1;
         numbers.clear();
@@ -346,7 +352,7 @@ impl Energy {
         self.are_known = joints.is_empty();
     }
 
-    /// Adds up what islands have.
+    /// Sums the accounts of islands.
     fn add_up(&mut self, world: &World, problem: &StepProblem, effort: &Effort) {
         let Self { accounts, numbers, entries, .. } = self;
         for account in accounts.iter_mut() {
@@ -372,8 +378,8 @@ impl Energy {
         free.for_each(|account| account.all.leave_out(account.common));
     }
 
-    /// Adds what the springs of contacts hold now that touch bodies on joints. Joints and contacts may push against each other without an end, so
-    /// that the springs of these contacts have a budget, too.
+    /// Adds the energy in the springs of contacts of jointed bodies. Joints and contacts can push against each other
+    /// without an end, so the springs of these contacts have a budget, too.
     fn add_contacts_of_jointed(&mut self, problem: &StepProblem, effort: &Effort) {
         self.jointed.clear();
         self.jointed.resize(problem.bodies.len(), false);
@@ -392,7 +398,7 @@ impl Energy {
         }
     }
 
-    /// Adds what the springs of other contacts gave back, in the islands that made energy without it.
+    /// Adds the energy that the springs of other contacts gave back, in islands that gained energy without it.
     fn add_released(&mut self, problem: &StepProblem, effort: &Effort) {
         for contact in problem.swept_contacts().filter(|contact| !is_jointed(&self.jointed, contact)) {
             let body = moved_by(problem, contact);
@@ -407,7 +413,7 @@ impl Energy {
         self.accounts.iter_mut().for_each(|account| account.released = account.released.max(0.0));
     }
 
-    /// Takes out what constraints made.
+    /// Removes the energy that constraints added.
     fn settle(
         &mut self,
         world: &World,
@@ -446,7 +452,7 @@ impl Energy {
                 stand_still(world, problem, members, dt.into(), *is_held, is_finer);
                 all.springs = 0.0;
             }
-            // Nothing is left.
+            // No energy is left over.
             *released = 0.0;
             all.after = all.given();
         }
@@ -456,7 +462,7 @@ impl Energy {
         taken
     }
 
-    /// Lets joints and contacts of the islands whose step was not taken begin without impulses.
+    /// Clears the impulses of joints and contacts in the islands whose step was refused.
     fn forget_impulses(&mut self, problem: &mut StepProblem) {
         let (numbers, accounts) = (&self.numbers, &self.accounts);
         let is_refused = |[a, b]: [u32; 2], problem: &StepProblem| {
@@ -476,7 +482,7 @@ impl Energy {
 }
 
 impl Kept {
-    /// What is kept where so much is left.
+    /// The kept energies if the motion lost `left`.
     fn of(entry: &Entry, left: f64) -> Self {
         let springs = left.min(entry.springs).max(0.0);
         Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32, made: 0.0 }
@@ -488,7 +494,7 @@ fn can_move(problem: &StepProblem, body: u32) -> bool {
     problem.masses.get(body as usize).is_some_and(|mass| mass.inv_mass > 0.0)
 }
 
-/// The body of a contact that it can move; the first of two.
+/// The movable body of a contact; the first one if both are movable.
 fn moved_by(problem: &StepProblem, contact: &ContactRow) -> usize {
     let [a, b] = [contact.body_a, contact.body_b];
     if can_move(problem, a) { a as usize } else { b as usize }
@@ -526,17 +532,18 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     };
     let before = 0.5 * m * v_0.length_squared() + spinning(&|| body.rotation, body.angular_velocity);
     let after = 0.5 * m * v.length_squared() + spinning(&|| product(turn_of(row), body.rotation), w);
-    // The radius of gyration is a size.
+    // The radius of gyration is a measure of size.
     let size = f64::from(body.mass.principal_inertia.min_element() / body.mass.mass).sqrt();
     let rest = ROUNDING * m * f64::from(acceleration.length()) * size;
     let slack = REGAINED * after + rest;
-    // Gravity rounds a velocity in each substep alike; short substeps add up changes, which round less. Energy that constraints made does not count.
+    // Gravity causes the same rounding of a velocity in each substep. Short substeps sum changes, which round less.
+    // Energy that constraints added does not count.
     let rounding = after.min(before + pushed.max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
     Entry { before, after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
 }
 
-/// The way of a body from and to the times of its velocities, which belong to the middle of a substep (m): it went half a substep further at the
-/// last of them, and not at the first.
+/// Displacement of a body between the times of its velocities, which belong to the middle of a substep (m): at the last
+/// of them the body has moved half a substep further, but not at the first.
 fn way(row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
     Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep)
 }
@@ -549,8 +556,8 @@ fn common(body: &Body, i: usize, problem: &StepProblem, substep: f64) -> Common 
     Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(row, v, v_0, substep) }
 }
 
-/// Whether some bodies went no further in a step than twice as far as the fastest of them could go, and than stabilization brings them: over the
-/// longest lever (m) of their joints, or out of each other.
+/// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of them
+/// could move, the distance by which stabilization moves it, and the longest lever (m) of the joints.
 fn is_in_reach(
     world: &World,
     problem: &StepProblem,
@@ -568,12 +575,12 @@ fn is_in_reach(
     members.into_iter().all(|i| Vec3::from(problem.bodies[i].dp).as_dvec3().length() <= reach)
 }
 
-/// How far a body turned in the step, as its pose will have it.
+/// Rotation of a body in the step, as its pose will have it.
 fn turn_of(row: &BodyRow) -> Quat {
     unit(Quat::from_array(row.dq))
 }
 
-/// The motion that some bodies have as one rigid body.
+/// The motion of some bodies as one rigid body.
 #[derive(Clone, Copy, Default)]
 struct RigidMotion {
     center: DVec3,
@@ -594,7 +601,7 @@ struct Momenta {
 }
 
 impl Momenta {
-    /// Of bodies, each with its center of mass, its velocities, and its turn in the step.
+    /// Sums over bodies. Each has its center of mass, its velocities, and its rotation in the step.
     fn of(world: &World, bodies: impl Iterator<Item = (usize, DVec3, [DVec3; 2], Quat)> + Clone) -> Self {
         let mut all = Self::default();
         for (i, place, [v, _], _) in bodies.clone() {
@@ -624,7 +631,7 @@ impl Momenta {
     }
 }
 
-/// Some bodies as the step left them.
+/// Some bodies after the step.
 fn now(world: &World, problem: &StepProblem, members: impl Iterator<Item = usize> + Clone) -> Momenta {
     let body = |i: usize| {
         let row = &problem.bodies[i];
@@ -634,7 +641,7 @@ fn now(world: &World, problem: &StepProblem, members: impl Iterator<Item = usize
     Momenta::of(world, members.map(body))
 }
 
-/// Some bodies as the step found them, with what forces and torques gave them since.
+/// Some bodies before the step, plus the effect of forces and torques since.
 fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<Item = usize> + Clone) -> Momenta {
     let body = |i: usize| {
         let body = &world.bodies[i];
@@ -646,10 +653,11 @@ fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<
     all
 }
 
-/// Takes the energy `over` (J) of all that they have, `kinetic`, out of the motion of some bodies (where nothing holds them, of that beside their common motion), and no momentum where nothing holds them: their
-/// motion against the rigid motion of all slows down, and that of all becomes the one with the momentum `from_start`. Places may be so wrong that
-/// the turn with this angular momentum has more energy than is left: it gives way, if the energy is more by the share [`COARSE`] at most;
-/// beyond that nothing changes, and the result is false.
+/// Removes the energy `over` (J) from the motion of some bodies, which have `kinetic` in total; if nothing holds them,
+/// without their common motion. If nothing holds them, momentum is conserved: their motion relative to the rigid motion
+/// of all slows down, and the rigid motion becomes the one with the momentum `from_start`. Positions can be so wrong
+/// that the rotation with this angular momentum has more energy than is left. Then the rotation is reduced if the
+/// excess is at most the share [`COARSE`]. Otherwise nothing changes and the result is false.
 fn brake(
     world: &World,
     problem: &mut StepProblem,
@@ -672,13 +680,14 @@ fn brake(
     true
 }
 
-/// The rigid motion of some bodies now, and the one with the momentum from the begin of the step; at rest where something holds them.
+/// The rigid motion of some bodies now, and the one with the momentum from the start of the step. Both are zero if
+/// something holds the bodies.
 fn rigid_motions(now: &Momenta, from_start: Option<&Momenta>) -> [RigidMotion; 2] {
     let of_start = |&Momenta { linear, angular, .. }: &Momenta| Momenta { linear, angular, ..*now }.rigid();
     from_start.map_or([RigidMotion::default(); 2], |start| [now.rigid(), of_start(start)])
 }
 
-/// Scales the motion of some bodies against one rigid motion, and gives them another instead of that.
+/// Scales the motion of some bodies relative to one rigid motion, and replaces that rigid motion by another one.
 fn slow_down(
     world: &World,
     problem: &mut StepProblem,
@@ -696,8 +705,8 @@ fn slow_down(
     }
 }
 
-/// Brings some bodies back to where the step found them, but for a fall of all together where nothing holds them. `is_kept`: they keep their
-/// velocities; else they move as one.
+/// Moves some bodies back to their poses before the step, except for a common fall if nothing holds them. If `is_kept`,
+/// they keep their velocities; otherwise they move as one rigid body.
 fn stand_still(
     world: &World,
     problem: &mut StepProblem,

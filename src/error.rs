@@ -1,12 +1,11 @@
-//! Errors with a reason outside the numbers: the caller's input, or the machine.
+//! Errors with a cause outside the numbers: the caller's input, or the machine.
 //!
-//! Trouble *in* the numbers (a body that left the finite range, a contact without a color) is not an
-//! error where a step made it: it is counted in [`StepStats`](crate::stats::StepStats) and shown. A number out of
-//! range that a caller sets is one.
+//! Trouble *in* the numbers that a step causes is not an error: a body that left the finite range, or a contact without
+//! a color. [`StepStats`](crate::stats::StepStats) counts it. A number out of range that a caller sets is an error.
 
 use std::path::PathBuf;
 
-/// One line that names what is wrong and where.
+/// An error. Its message is one line that names the problem and its place.
 ///
 /// ```
 /// use drystone::{Error, Result};
@@ -22,38 +21,38 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The caller's input cannot be used: a scene file, a setting, a parameter.
+    /// The caller's input cannot be used: a scene file, a setting, or a parameter.
     #[error("{}", one_line(.0))]
     Input(String),
     /// A file could not be read or written.
     #[error("{}: {source}", one_line(.path.display()))]
     File {
-        /// The file as the caller named it.
+        /// The path of the file, as the caller wrote it.
         path: PathBuf,
         /// The error of the operating system.
         source: std::io::Error,
     },
-    /// No adapter, or one that cannot do what is asked.
+    /// There is no adapter, or it cannot do the requested work.
     #[error("{0}")]
     Adapter(String),
-    /// The device was lost in the course of the work.
+    /// The device was lost during the work.
     #[error("{0}")]
     Lost(String),
-    /// The problem is larger than the adapter's buffers or than its memory.
+    /// The problem is larger than the adapter's buffers or memory.
     #[error("{0}")]
     TooLarge(String),
-    /// A computation came to an end that should not be: a mistake of this library or of parry.
+    /// A computation panicked. This is a defect of this library or of parry.
     #[error("{}", one_line(.0))]
     Panicked(String),
 }
 
 impl Error {
-    /// An [`Error::Input`] from anything that prints.
+    /// An [`Error::Input`] with a message.
     pub fn input(message: impl std::fmt::Display) -> Self {
         Self::Input(message.to_string())
     }
 
-    /// Says where an [`Error::Input`] is: `place: message`.
+    /// Adds the place to an [`Error::Input`]: `place: message`.
     pub fn within(self, place: impl std::fmt::Display) -> Self {
         match self {
             Self::Input(message) => Self::Input(format!("{place}: {message}")),
@@ -61,13 +60,13 @@ impl Error {
         }
     }
 
-    /// Wraps an I/O error with the path it happened on.
+    /// Wraps an I/O error with the path of the file.
     pub fn file(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::File { path, source }
     }
 
-    /// Exit code of the command line: 1 for a mistake of the program, 2 for the caller's input, 3 for the machine.
+    /// Exit code of the command line: 1 for a defect of the program, 2 for the caller's input, 3 for the machine.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Panicked(_) => 1,
@@ -77,18 +76,18 @@ impl Error {
     }
 }
 
-/// A text as one line, whatever a file or a caller has in it.
+/// A text on one line, whatever a file or a caller put into it.
 fn one_line(text: impl std::fmt::Display) -> String {
     text.to_string().replace(char::is_control, " ")
 }
 
-/// An [`Error::Input`] with a text as of `format!`.
+/// An [`Error::Input`] with a text, like `format!`.
 macro_rules! input {
     ($($text:tt)*) => { $crate::error::Error::Input(format!($($text)*)) };
 }
 pub(crate) use input;
 
-/// Refuses the caller's input with a message unless a condition holds.
+/// Returns the caller's input error with a message unless a condition holds.
 pub(crate) fn ensure(holds: bool, message: impl FnOnce() -> String) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::Input(message())) }
 }

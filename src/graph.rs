@@ -1,23 +1,24 @@
-//! Graph coloring: constraints are put into colors in which no body that a sweep writes occurs twice.
+//! Graph coloring: assigns constraints to colors, so that within a color a sweep writes no body twice.
 //!
-//! Integers only. Only bodies that can move count, so a floor costs no color. A constraint keeps its color from step to
-//! step; a new one takes the first that is free on both of its bodies (greedy, in the order of the ranks given), and the place of an
-//! ended one is free again. Constraints with one movable body have colors of their own, swept last: what rests on
-//! something fixed has the last word. A constraint that finds no color is swept alone, and counted.
+//! It uses only integers. Only movable bodies count, so a floor costs no color. A constraint keeps its color from step
+//! to step. A new constraint takes the first color that is free on both of its bodies (greedy, in the order of the
+//! given ranks), and the place of an ended one becomes free. Constraints with one movable body have separate colors,
+//! which are swept last: contacts with fixed bodies have the last word. A constraint that gets no color is swept alone,
+//! and counted.
 
 /// A body that no sweep writes.
 pub const IMMOVABLE: u32 = u32::MAX;
 
-/// One constraint between two bodies, either of which may be [`IMMOVABLE`], with the color it has so far.
+/// One constraint between two bodies, with its color so far. Either body can be [`IMMOVABLE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Edge {
     /// One body.
     pub a: u32,
     /// The other body.
     pub b: u32,
-    /// Its color among those of its kind; none if it is new, or found none.
+    /// Its color among those of its kind, or `None` if it is new or has no color.
     pub color: Option<u8>,
-    /// New ones choose in the order of their ranks, then of their indices.
+    /// New constraints choose colors in the order of their ranks, then of their indices.
     pub rank: u64,
 }
 
@@ -29,44 +30,45 @@ impl Edge {
     }
 }
 
-/// The constraints that take part, in the order in which they are swept.
+/// The active constraints, in the order of the sweep.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Coloring {
     /// Indices of the edges, color by color.
     pub order: Vec<u32>,
-    /// Where each color begins in `order`, and where the last ends: one more than there are colors.
+    /// The start of each color in `order`, and the end of the last: one entry more than there are colors.
     pub offsets: Vec<u32>,
-    /// Edges that found no color; each stands as a color of its own.
+    /// Number of edges without a color. Each one is a color of its own.
     pub overflow: u32,
 }
 
 crate::saved::state!(Coloring { order, offsets, overflow });
 
 impl Coloring {
-    /// Number of colors, the single ones of the overflow included.
+    /// Number of colors, including the single ones of the overflow.
     pub fn color_count(&self) -> usize {
         self.offsets.len().saturating_sub(1)
     }
 }
 
-/// Which colors each body is in.
+/// The used colors of each body.
 #[derive(Debug, Default)]
 pub struct ConstraintGraph {
-    /// One bit a color and body, for constraints of two movable bodies and for those with a fixed one.
+    /// One bit for each color and body: for constraints of two movable bodies, and for those with a fixed body.
     used: [Vec<u64>; 2],
 }
 
 crate::saved::cloned!(ConstraintGraph {} scratch { used });
 
 impl ConstraintGraph {
-    /// Gives every edge a color; see [`Self::color_members`].
+    /// Assigns a color to every edge; see [`Self::color_members`].
     pub fn color(&mut self, body_count: usize, edges: &mut [Edge], max_colors: u32) -> Coloring {
         let members: Vec<u32> = (0..edges.len() as u32).collect();
         self.color_members(body_count, edges, &members, max_colors)
     }
 
-    /// Gives the edges that take part, `members` by their indices, a color each among at most `max_colors` (1 to 64) a kind, and lays
-    /// them out for sweeping. An edge that takes no part keeps the number of its color, but another edge may take the place.
+    /// Assigns a color to each active edge, and lays the edges out for sweeping. `members` has their indices, and each
+    /// kind has at most `max_colors` (1 to 64) colors. An inactive edge keeps the number of its color, but another edge
+    /// can take its place.
     pub fn color_members(
         &mut self,
         body_count: usize,
@@ -79,7 +81,7 @@ impl ConstraintGraph {
             used.clear();
             used.resize(body_count, 0);
         }
-        // Edges that have a color keep it, and so take their place first.
+        // Edges that already have a color take their place first.
         let mut new = Vec::new();
         for &i in members {
             let edge = &mut edges[i as usize];
@@ -104,7 +106,7 @@ impl ConstraintGraph {
         lay_out(edges, members)
     }
 
-    /// Colors in which neither body is.
+    /// Colors that neither body uses.
     fn free(&self, edge: &Edge) -> u64 {
         let used = &self.used[usize::from(edge.is_fixed())];
         let of = |body: u32| if body == IMMOVABLE { 0 } else { used[body as usize] };
@@ -121,7 +123,7 @@ impl ConstraintGraph {
     }
 }
 
-/// Bodies that are connected, however far.
+/// Sets of connected bodies.
 #[derive(Clone, Debug, Default)]
 pub struct Islands {
     /// A body nearer to the root, or the root itself.
@@ -129,13 +131,13 @@ pub struct Islands {
 }
 
 impl Islands {
-    /// So many bodies, each alone.
+    /// Resets to `bodies` islands of one body each.
     pub fn reset(&mut self, bodies: usize) {
         self.toward_root.clear();
         self.toward_root.extend(0..bodies as u32);
     }
 
-    /// Makes one island of two.
+    /// Joins the islands of two bodies.
     pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.toward_root[a.max(b) as usize] = a.min(b);
@@ -143,14 +145,14 @@ impl Islands {
 
     /// The root of each body, after all joins.
     pub fn roots(&mut self) -> &[u32] {
-        // A body nearer to the root has a smaller index, and so knows its root already.
+        // A body nearer to the root has a smaller index, so its root is already known.
         for i in 0..self.toward_root.len() {
             self.toward_root[i] = self.toward_root[self.toward_root[i] as usize];
         }
         &self.toward_root
     }
 
-    /// The body of the island with the smallest index; shortens the way there.
+    /// The root of a body: the body of its island with the smallest index. Shortens the path to it.
     pub fn root(&mut self, body: u32) -> u32 {
         let (to, mut i) = (&mut self.toward_root, body as usize);
         while to[i] as usize != i {

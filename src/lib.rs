@@ -1,5 +1,5 @@
-//! Contact between rigid bodies: graph-colored sequential impulses on wgpu compute shaders, with a CPU reference that
-//! follows the same plan.
+//! Contact, Coulomb friction and joints between rigid bodies. The solver runs projected sequential impulses over a
+//! colored graph of contacts: on the CPU with SIMD lanes and threads, or on wgpu compute shaders.
 //!
 //! One step is a straight line, [`Simulation::step`]:
 //!
@@ -12,21 +12,21 @@
 //! store    poses and velocities back                                          -> world              problem
 //! ```
 //!
-//! A step is a value ([`StepProblem`]: plain rows), the order of work is data ([`StepPlan`]: a list of passes), and every
-//! function of a shader has a Rust double of the same name ([`stages::kernels`]), so that every number of the GPU has something
-//! to be compared with.
+//! One step is a value ([`StepProblem`], plain rows) and the order of work is data ([`StepPlan`], a list of passes).
+//! Every shader function has a Rust twin of the same name ([`stages::kernels`]), so a test can compare every number
+//! that the GPU computes.
 //!
 //! | To | call |
 //! |---|---|
 //! | build a world | [`World`], [`Body`], [`Shape`], [`Joint`]; or find a [`Scene`] of the catalogue or a file |
 //! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
-//! | choose what runs the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
+//! | choose a backend for the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
-//! | step many worlds, each by itself | [`batch::Batch`] |
+//! | step many independent worlds | [`batch::Batch`] |
 //! | go back, fork, save and load | [`Rollback`], [`Simulation::fork`], [`Simulation::snapshot`], [`Simulation::save`] |
 //! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
-//! | hear of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
+//! | get events of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
 //! | measure overlap, speed, drift | [`metrics`] |
 //! | check an adapter and its driver | `conform` |
 //! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
@@ -112,7 +112,7 @@ pub struct Readme;
 #[doc = include_str!("../docs/library.md")]
 pub struct Library;
 
-/// The example of the page for people who come from another engine, likewise.
+/// The example of the page for users of other engines, likewise.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/from-other-engines.md")]
 pub struct FromOtherEngines;

@@ -1,10 +1,11 @@
-//! Arithmetic that gives the same bits everywhere: + - * and comparisons only, in a written order.
+//! Arithmetic with the same bits on every platform: only + - * and comparisons, in a fixed order.
 //!
-//! Written over [`Lane`], one text is at once the scalar reference (`f32`) and the high-precision path (`f64`).
-//! Branches are `select`s, as in WGSL. Every function here is the double of one in `shaders/lib/math.wgsl`, of the same
-//! name and the same order of operations; `tests/gpu/kernels.rs` holds the two together.
+//! The functions are generic over [`Lane`]: one text is both the scalar reference (`f32`) and the high-precision path
+//! (`f64`). Branches are `select`s, as in WGSL. Every function here is the twin of one in `shaders/lib/math.wgsl`, with
+//! the same name and the same order of operations; `tests/gpu/kernels.rs` compares the two.
 //!
-//! `#[inline(always)]` and no closures: a helper that is not inlined loses the instruction set of its caller.
+//! Functions are `#[inline(always)]` and use no closures: a helper that is not inlined loses the instruction set of its
+//! caller.
 
 mod movement;
 pub mod rotation;
@@ -14,7 +15,7 @@ pub use movement::NormalMovement;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// A number, or several that are worked on side by side.
+/// A number, or several that are processed side by side.
 pub trait Lane:
     Copy
     + Debug
@@ -30,7 +31,7 @@ pub trait Lane:
 {
     /// The result of a comparison of two lanes.
     type Mask: Copy;
-    /// Numbers that are kept of a column of three: with one more, a column of single numbers fills a register.
+    /// Number of kept numbers in a column of three. With one more, a column of single numbers fills a register.
     const COLUMN: usize = 3;
     /// The same constant in every lane.
     fn constant(x: f64) -> Self;
@@ -38,11 +39,11 @@ pub trait Lane:
     fn gt(self, other: Self) -> Self::Mask;
     /// Both.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// The same truth in every lane.
+    /// The same truth value in every lane.
     fn mask(value: bool) -> Self::Mask;
-    /// Whether it holds in any lane.
+    /// Whether the mask is true in any lane.
     fn any(mask: Self::Mask) -> bool;
-    /// `if_true` where the mask holds; arguments in WGSL's order.
+    /// `if_true` in lanes where the mask is true. Arguments are in WGSL's order.
     fn select(if_false: Self, if_true: Self, mask: Self::Mask) -> Self;
     /// The larger of two; `b` if they are equal or either is NaN.
     #[inline(always)]
@@ -54,27 +55,28 @@ pub trait Lane:
     fn smaller(a: Self, b: Self) -> Self {
         Self::select(b, a, b.gt(a))
     }
-    /// 1/sqrt(x) for normal positive x. In `f32` exactly as the shader does it, about 1 ulp off.
+    /// 1/sqrt(x) for normal positive x. In `f32` it has the bits of the shader, with an error of about 1 ulp.
     fn inverse_sqrt(self) -> Self;
-    /// One over the power of two in x: x times it is of size 1 to 2. For normal x of either sign, in `f32` below 2^127.
+    /// The inverse of the power of two in x: the product of both is between 1 and 2 in size. For normal x of either
+    /// sign, in `f32` below 2^127.
     fn inverse_power(self) -> Self;
 }
 
-/// A lane of one number, which can be converted to and from `f32` storage.
+/// A lane of one number, with conversion to and from `f32` storage.
 pub trait Scalar: Lane + PartialOrd + From<f32> {
-    /// To storage, rounded to nearest.
+    /// Converts to storage, rounded to nearest.
     fn to_f32(self) -> f32;
 }
 
-/// Less half of the bits of a positive number, it is the bits of a first guess at the inverse square root.
+/// This constant, minus half the bits of a positive number, gives the bits of a first guess of the inverse square root.
 pub(crate) const INVERSE_SQRT_GUESS: u32 = 0x5f37_5a86;
 
 /// The bits of an exponent in a number.
 pub(crate) const EXPONENT: u32 = 0x7f80_0000;
-/// Less the bits of an exponent, it is those of the opposite one.
+/// This constant, minus the exponent bits of a number, gives the bits of the opposite exponent.
 pub(crate) const OPPOSITE_EXPONENT: u32 = 0x7f00_0000;
 
-/// 1/sqrt(x) from a guess at it: three steps of Newton's method.
+/// 1/sqrt(x) from a guess: three steps of Newton's method.
 #[inline(always)]
 pub(crate) fn newton_inverse_sqrt<L: Lane>(x: L, guess: L) -> L {
     let half_x = L::constant(0.5) * x;
@@ -179,7 +181,7 @@ pub fn smaller<L: Lane>(a: L, b: L) -> L {
     L::smaller(a, b)
 }
 
-/// 1/x, of either sign. Scaled, so that no square leaves single precision.
+/// 1/x for either sign, scaled so that no square leaves the range of single precision.
 #[inline(always)]
 pub fn reciprocal<L: Lane>(x: L) -> L {
     let scale = x.inverse_power();
@@ -206,7 +208,7 @@ pub fn vec3<L>(x: L, y: L, z: L) -> Vec3<L> {
     Vec3 { x, y, z }
 }
 
-/// Operators that work component by component, as in WGSL.
+/// Component-wise operators, as in WGSL.
 macro_rules! component_by_component {
     ($($Operator:ident $name:ident $sign:tt;)*) => {$(
         impl<L: Lane> $Operator for Vec3<L> {
@@ -252,14 +254,14 @@ impl<L: Lane> Neg for Vec3<L> {
 }
 
 impl<S: Scalar> Vec3<S> {
-    /// From storage.
+    /// Converts from storage.
     #[inline(always)]
     pub fn load(v: [f32; 3]) -> Self {
         let [x, y, z] = v.map(S::from);
         vec3(x, y, z)
     }
 
-    /// To storage.
+    /// Converts to storage.
     #[inline(always)]
     pub fn store(self) -> [f32; 3] {
         [self.x.to_f32(), self.y.to_f32(), self.z.to_f32()]
@@ -288,14 +290,14 @@ pub struct Quat<L> {
 }
 
 impl<S: Scalar> Quat<S> {
-    /// From storage, x y z w.
+    /// Converts from storage, x y z w.
     #[inline(always)]
     pub fn load(q: [f32; 4]) -> Self {
         let [x, y, z, w] = q.map(S::from);
         Self { axis: vec3(x, y, z), w }
     }
 
-    /// To storage, x y z w.
+    /// Converts to storage, x y z w.
     #[inline(always)]
     pub fn store(self) -> [f32; 4] {
         let [x, y, z] = self.axis.store();
@@ -303,7 +305,7 @@ impl<S: Scalar> Quat<S> {
     }
 }
 
-/// Product: first b, then a.
+/// Product: b first, then a.
 #[inline(always)]
 pub fn quat_mul<L: Lane>(a: Quat<L>, b: Quat<L>) -> Quat<L> {
     let (p, q) = (a.axis, b.axis);
@@ -317,21 +319,21 @@ pub fn quat_mul<L: Lane>(a: Quat<L>, b: Quat<L>) -> Quat<L> {
     }
 }
 
-/// How far the rotation q moves the arm r: q r - r, without the cancellation of that difference.
+/// Displacement of the arm r by the rotation q: q r - r, without the cancellation of that difference.
 #[inline(always)]
 pub fn turned<L: Lane>(q: Quat<L>, r: Vec3<L>) -> Vec3<L> {
     let t = cross3(q.axis, r);
     (t * q.w + cross3(q.axis, t)) * L::constant(2.0)
 }
 
-/// The same rotation backwards.
+/// The inverse rotation.
 #[inline(always)]
 pub fn conjugate<L: Lane>(q: Quat<L>) -> Quat<L> {
     Quat { axis: vec3(-q.axis.x, -q.axis.y, -q.axis.z), w: q.w }
 }
 
-/// The rotation by the vector r (rad), from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns
-/// by 4 rad: the series would leave the unit quaternions, and soon the finite numbers.
+/// The rotation by the vector r (rad), from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer
+/// vector rotates by 4 rad: beyond that the series would leave the unit quaternions, and soon the finite numbers.
 #[inline(always)]
 pub fn exp_rotation<L: Lane>(r: Vec3<L>) -> Quat<L> {
     let half = r * L::constant(0.5);
@@ -344,7 +346,7 @@ pub fn exp_rotation<L: Lane>(r: Vec3<L>) -> Quat<L> {
     Quat { axis: vec3(u.x * sinc, u.y * sinc, u.z * sinc), w: cosine }
 }
 
-/// A nearly unit quaternion, closer to unit length by one Newton step.
+/// A nearly unit quaternion, brought closer to unit length by one Newton step.
 #[inline(always)]
 pub fn renormalized<L: Lane>(q: Quat<L>) -> Quat<L> {
     let a = q.axis;
@@ -410,7 +412,7 @@ mod tests {
         assert!((1.0..2.0).contains(&(tiny.inverse_power() * tiny)));
     }
 
-    /// Scaling by powers of two rounds nothing.
+    /// Scaling by powers of two causes no rounding.
     #[test]
     fn the_reciprocal_has_the_bits_that_it_has_unscaled() {
         for k in 1..100_000 {

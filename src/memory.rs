@@ -1,18 +1,20 @@
-//! Whether what is asked for fits into the memory that there is: said in a line before, instead of an abort after minutes.
+//! Checks whether a request fits into the available memory. The error is one line in advance, instead of an abort after
+//! minutes.
 
 use std::fmt::Display;
 use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Bytes that a body takes at least while it is simulated, rows and a copy of the scene included. Measured: 2.1 kB in a grid of
+/// Smallest number of bytes for a simulated body, including rows and a copy of the scene. Measured: 2.1 kB in a grid of
 /// joints, 4 kB in a pile that still falls.
 pub const BODY: f64 = 2000.0;
 
-/// Refuses a world or film that takes more memory than the machine has. Where the machine does not say, all pass.
+/// Refuses a world or film that takes more memory than the machine has. If the available memory is unknown, every
+/// request passes.
 ///
 /// # Errors
-/// One line that names `what`, what it takes and what there is.
+/// One line names `what`, the required and the available memory.
 pub fn check(bytes: f64, what: impl Display) -> Result<()> {
     match available().filter(|&there| bytes > there) {
         Some(there) => Err(Error::TooLarge(format!(
@@ -24,7 +26,8 @@ pub fn check(bytes: f64, what: impl Display) -> Result<()> {
     }
 }
 
-/// Bytes that this process may still take, as Linux and the limits of process and container say it; none elsewhere.
+/// Memory that is still available to this process (B), as reported by Linux and by the limits of process and container;
+/// `None` elsewhere.
 fn available() -> Option<f64> {
     let kib = |bytes: f64| bytes * 1024.0;
     let machine = number_after("/proc/meminfo", "MemAvailable:").map(kib);
@@ -33,12 +36,12 @@ fn available() -> Option<f64> {
     [machine, process, container].into_iter().flatten().reduce(f64::min)
 }
 
-/// Resident memory of this process (B), as Linux says it; none elsewhere.
+/// Resident memory of this process (B), as reported by Linux; `None` elsewhere.
 pub fn resident() -> Option<f64> {
     number_after("/proc/self/status", "VmRSS:").map(|kib| kib * 1024.0)
 }
 
-/// The number behind a word that begins a line; none without the file, the line or a number, as in `unlimited`.
+/// The number after a word at the start of a line. `None` without the file, the line or a number, as in `unlimited`.
 fn number_after(path: impl AsRef<Path>, head: &str) -> Option<f64> {
     let text = std::fs::read_to_string(path).ok()?;
     text.lines().find_map(|line| line.strip_prefix(head))?.split_whitespace().next()?.parse().ok()

@@ -7,7 +7,7 @@ use crate::config::SolverConfig;
 use crate::stats::largest;
 use crate::world::{Body, BodyKind, World};
 
-/// Overlap over all touching pairs.
+/// Overlap of all touching pairs.
 ///
 /// ```
 /// use drystone::{Body, Shape, SolverConfig, World, glam::Vec3, metrics::Penetration};
@@ -17,7 +17,7 @@ use crate::world::{Body, BodyKind, World};
 /// world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0));
 /// let Penetration { max, mean, .. } = Penetration::of_world(&world, &SolverConfig::default());
 /// assert!((max - 0.01).abs() < 1e-6 && max == mean);
-/// // Of two manifolds with separations of two points each (m).
+/// // Two manifolds with the separations of two points each (m).
 /// let both = Penetration::of([[-0.5_f32, 0.1].into_iter(), [0.0, 0.2].into_iter()]);
 /// assert_eq!((both.max, both.mean), (0.5, 0.25));
 /// ```
@@ -26,15 +26,15 @@ use crate::world::{Body, BodyKind, World};
 pub struct Penetration {
     /// Deepest (m).
     pub max: f64,
-    /// Depth that 95 % of the same manifolds do not exceed (m).
+    /// 95th percentile of the depth over the same manifolds (m).
     pub p95: f64,
-    /// Mean over the manifolds whose surfaces are within their margin of each other, of each one's deepest point (m).
+    /// Mean depth of the deepest point, over the manifolds whose surfaces are within their margin of each other (m).
     pub mean: f64,
 }
 
 impl Penetration {
-    /// Of a world as it is, from contacts computed anew; `config` says how near counts as contact. A body that no step takes
-    /// ([`World::check`]) touches nothing.
+    /// The overlap of a world at its present poses, from contacts that are computed anew. `config` sets the distance up
+    /// to which surfaces count as touching. A body that [`World::check`] refuses touches nothing.
     pub fn of_world(world: &World, config: &SolverConfig) -> Self {
         let world = fit(world);
         let mut detector = Detector::new(&world);
@@ -43,15 +43,15 @@ impl Penetration {
         Self::of(manifolds.map(|manifold| manifold.points().iter().map(|point| point.separation)))
     }
 
-    /// Of the separations (m) of the points of each manifold; a manifold that is apart counts as zero.
+    /// The overlap from the separations (m) of the points of each manifold. A separated manifold counts as zero.
     pub fn of<Points: Iterator<Item = f32>>(manifolds: impl IntoIterator<Item = Points>) -> Self {
         let deepest = |points: Points| largest(0.0, points.map(|separation| f64::from(-separation)));
         let mut depths: Vec<f64> = manifolds.into_iter().map(deepest).collect();
-        // NaN sorts last, so that it spoils the largest.
+        // NaN sorts last, so the maximum is NaN.
         depths.sort_by(f64::total_cmp);
         let max = depths.last().copied().unwrap_or(0.0);
         let p95 = depths.get((depths.len() * 95).div_ceil(100).saturating_sub(1)).copied().unwrap_or(0.0);
-        // Not a sum, which is -0 for none.
+        // A sum of an empty list would be -0.
         let mean = depths.iter().fold(0.0, |total, depth| total + depth) / depths.len().max(1) as f64;
         Self { max, p95, mean }
     }
@@ -81,7 +81,7 @@ fn fit(world: &World) -> Cow<'_, World> {
 /// assert_eq!(metrics::fastest(&world), (4.0, 1));
 /// ```
 pub fn fastest(world: &World) -> (f64, usize) {
-    // Slower than any, so that a body at rest is named where all are.
+    // Start below any speed, so that a body is found even if all are at rest.
     let mut best = (-1.0, 0);
     for (i, b) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic) {
         let speed = b.linear_velocity.as_dvec3().length();
@@ -108,7 +108,7 @@ pub fn rms_speed(world: &World) -> f64 {
     if mass > 0.0 { (2.0 * world.kinetic_energy() / mass).sqrt() } else { 0.0 }
 }
 
-/// Half of the height of the box along the world's axes around a body as it is (m); 0 without shapes.
+/// Half of the height of a body's axis-aligned box at its present pose (m); 0 without shapes.
 ///
 /// ```
 /// use drystone::{Body, Shape, metrics::half_height};
@@ -124,7 +124,7 @@ pub fn half_height(body: &Body) -> f64 {
     body.solids().map(bounds).reduce(both).map_or(0.0, |(low, high)| 0.5 * (high - low))
 }
 
-/// Whether the center of mass of a body moved by less than half of the height that the body had.
+/// Whether the center of mass of a body moved by less than half of the height that the body had before.
 ///
 /// ```
 /// use drystone::{Body, Shape, metrics::in_place};
@@ -138,7 +138,7 @@ pub fn in_place(before: &Body, after: &Body) -> bool {
     moved < half_height(before)
 }
 
-/// Largest horizontal distance of a dynamic body's center of mass from where it was `before` (m).
+/// Largest horizontal displacement of a dynamic body's center of mass since `before` (m).
 ///
 /// ```
 /// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
@@ -156,7 +156,7 @@ pub fn drift(before: &World, after: &World) -> f64 {
     largest(0.0, dynamic.map(moved).map(|d| d.x.hypot(d.z)))
 }
 
-/// Dynamic bodies of `after` that are in place, see [`in_place`].
+/// Number of dynamic bodies of `after` that are in place, see [`in_place`].
 ///
 /// ```
 /// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
@@ -199,7 +199,7 @@ mod tests {
         assert!(!in_place(&start, &start.clone().position(f32::NAN, 0.0, 0.0)));
     }
 
-    /// Twenty cubes side by side, the k-th k mm deep in the floor, and one that is apart from it.
+    /// Twenty cubes side by side, the k-th k mm deep in the floor, and one above the floor.
     #[test]
     fn penetration_is_the_deepest_the_mean_and_what_19_of_20_do_not_exceed() {
         let mut world = World::new();
@@ -217,14 +217,14 @@ mod tests {
         world.add(cube(21, 0.505));
         let of = Penetration::of_world(&world, &config);
         assert!(near(of.max, 0.020) && near(of.p95, 0.019) && near(of.mean, 0.010), "{of:?}");
-        // Bodies that no step takes touch nothing.
+        // Bodies that cannot be simulated touch nothing.
         world.add(Body::dynamic().shape(Shape::cuboid(1.0, -1.0, 1.0)));
         world.add(cube(22, f32::NAN));
         assert_eq!(Penetration::of_world(&world, &config), of);
         assert_eq!(Penetration::of_world(&World::new(), &config), Penetration::default());
     }
 
-    /// 1 kg at 3 m/s, 3 kg at 1 m/s, and a fixed body that has no part in it.
+    /// 1 kg at 3 m/s, 3 kg at 1 m/s, and a fixed body that does not count.
     fn two_that_move() -> World {
         let mut world = World::new();
         world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
@@ -263,7 +263,7 @@ mod tests {
         after.bodies[0].position.x += 100.0;
         assert!((drift(&before, &after) - 5.0).abs() < 1e-6);
         assert_eq!(in_place_count(&before, &after), 1);
-        // A way down counts as one aside.
+        // Downward and sideways displacements count alike.
         assert!(!in_place(&before.bodies[1], &before.bodies[1].clone().position(0.0, -0.6, 0.0)));
         assert_eq!(drift(&before, &before), 0.0);
     }

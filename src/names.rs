@@ -1,15 +1,16 @@
-//! The names of kinds in files, on command lines and in messages.
+//! Names of enum values in files, on command lines and in messages.
 
-/// Gives a kind without fields one name a value: `ALL`, `name`, `Display`, `FromStr`. The tests of this repository use it too.
+/// Gives each value of an enum without fields one name: `ALL`, `name`, `Display`, `FromStr`. The tests of this
+/// repository use it too.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! named {
     ($kind:ident { $($value:ident = $name:literal,)+ }) => {
         impl $kind {
-            /// All, in their order.
+            /// All values, in order.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$value),+];
 
-            /// Their names.
+            /// Names of the values.
             pub(crate) const NAMES: [&'static str; Self::ALL.len()] = [$($name),+];
 
             /// Its name in files, on command lines and in messages.

@@ -1,9 +1,9 @@
-//! A panic of a thread that detects contacts, as an error of the step.
+//! Converts a panic in contact detection to an error of the step.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-/// What a panic said.
+/// A caught panic.
 pub(crate) struct Panic {
     /// The bodies whose contact was computed.
     pub bodies: Option<[u32; 2]>,
@@ -23,7 +23,7 @@ pub(crate) fn text_of(payload: &(dyn Any + Send)) -> Option<&str> {
     text.or_else(|| payload.downcast_ref::<&str>().copied())
 }
 
-/// Calls `compute`. A panic of it goes on with the bodies, up to [`caught`].
+/// Calls `compute`. A panic in it continues with the bodies attached, up to [`caught`].
 pub(crate) fn blaming<T>(bodies: [u32; 2], compute: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(compute)).unwrap_or_else(|payload| {
         let panic = Panic { bodies: Some(bodies), ..Panic::of(payload) };
@@ -31,7 +31,7 @@ pub(crate) fn blaming<T>(bodies: [u32; 2], compute: impl FnOnce() -> T) -> T {
     })
 }
 
-/// Calls `compute`, whose threads may panic. The caller makes anew what a panic leaves half done.
+/// Calls `compute`. Its threads can panic. The caller then has to rebuild incomplete data.
 pub(crate) fn caught<T>(compute: impl FnOnce() -> T) -> Result<T, Panic> {
     catch_unwind(AssertUnwindSafe(compute)).map_err(Panic::of)
 }

@@ -1,10 +1,10 @@
-//! Settings by name. A preset is a promise with numbers, which tests/scenes/presets.rs keeps.
+//! Named settings. A preset promises figures, and tests/scenes/presets.rs checks them.
 
 use crate::config::SolverConfig;
 use crate::names::named;
 
-/// How much error is paid for with time: the same rules with more or fewer substeps, which measures best of all ways to spend
-/// a sweep (docs/speed-vs-error.md).
+/// A trade-off between error and time. Presets have the same rules with more or fewer substeps: in measurements,
+/// substeps are the most efficient use of a sweep (docs/speed-vs-error.md).
 ///
 /// ```
 /// use drystone::preset::Preset;
@@ -24,13 +24,14 @@ pub enum Preset {
     Balanced,
     /// 32 substeps.
     Accurate,
-    /// 128 substeps: to hold the others against.
+    /// 128 substeps: for comparison with the others.
     Reference,
 }
 
 named!(Preset { Fast = "fast", Balanced = "balanced", Accurate = "accurate", Reference = "reference", });
 
-/// The figures that a preset holds at 60 steps a second. Cubes are of 1 m and 1000 kg, towers lean by 1 cm to one side and the other in turn.
+/// The figures that a preset promises at 60 steps a second. Cubes have 1 m and 1000 kg, and the cubes of a tower are 1
+/// cm off to alternating sides.
 ///
 /// ```
 /// use drystone::preset::{Preset, Promise};
@@ -41,18 +42,19 @@ named!(Preset { Fast = "fast", Balanced = "balanced", Accurate = "accurate", Ref
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Promise {
-    /// Cubes of a tower that stands for 20 s.
+    /// Number of cubes in a tower that stands for 20 s.
     pub tower: u32,
-    /// Density of the top cube of a tower of ten, relative to the others, which stands for 10 s.
+    /// Density of the top cube of a tower of ten, relative to the others. The tower stands for 10 s.
     pub heavy_top: f32,
-    /// Deepest overlap at any time of 10 s of a tower of five whose cubes begin to fall at 1 mm/s, so that no load is there before (m).
+    /// Deepest overlap during 10 s of a tower of five (m). Its cubes begin to fall at 1 mm/s, so that there is no load
+    /// before.
     pub deepest: f64,
-    /// The same at the end of them (m).
+    /// Overlap of that tower at the end of the 10 s (m).
     pub at_rest: f64,
 }
 
 impl Preset {
-    /// The settings.
+    /// The settings of the preset.
     pub fn config(self) -> SolverConfig {
         let substeps = match self {
             Self::Fast => 4,
@@ -63,7 +65,7 @@ impl Preset {
         SolverConfig { substeps, ..SolverConfig::default() }
     }
 
-    /// The figures that it holds.
+    /// The promised figures of the preset.
     pub fn promise(self) -> Promise {
         let promise = |tower, heavy_top, deepest, at_rest| Promise { tower, heavy_top, deepest, at_rest };
         match self {

@@ -1,4 +1,4 @@
-//! Random numbers that are the same everywhere and forever: nothing may depend on a crate's version.
+//! Random numbers that never change on any platform: scenes must not depend on the version of a crate.
 
 /// SplitMix64: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014.
 pub struct SplitMix64(u64);
@@ -22,7 +22,7 @@ impl SplitMix64 {
     }
 }
 
-/// A number in which every bit of `x` decides on every bit, different for each `x`: the finalizer of SplitMix64.
+/// A number in which every bit of `x` affects every bit, different for each `x`: the finalizer of SplitMix64.
 pub(crate) fn mixed(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -1,8 +1,8 @@
-//! Runs that are kept with all that a caller did, and run again.
+//! Recordings of runs and their replay.
 //!
-//! A recording begins with the state of a simulation. Each step adds its length and what the caller changed since the step before, found by
-//! comparison, so that no change is lost by whatever way it was made. Now and then the recording notes a hash of all bodies and keeps a whole
-//! state, to which a replay can jump.
+//! A recording begins with the state of a simulation. Each step adds its length and the caller's changes since the step
+//! before. The recorder finds the changes by comparison, so it records every change, however the caller made it. At
+//! intervals the recording adds a hash of all bodies, and a whole state to which a replay can jump.
 
 use std::io::Write;
 
@@ -15,7 +15,7 @@ use crate::simulation::{Simulation, hashes};
 use crate::stats::StepStats;
 use crate::world::{World, WorldChange};
 
-/// How often a recording notes a hash of all bodies, and keeps a whole state (steps).
+/// How often a recording adds a hash of all bodies and a whole state (steps).
 ///
 /// ```
 /// use drystone::RecordingIntervals;
@@ -26,9 +26,10 @@ use crate::world::{World, WorldChange};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordingIntervals {
-    /// Steps from hash to hash, 1 or more: with 1, a replay names the step and the body of the first difference.
+    /// Steps from one hash to the next, 1 or more. With 1, a replay names the step and the body of the first
+    /// difference.
     pub hash: u32,
-    /// Steps from state to state, 1 or more.
+    /// Steps from one state to the next, 1 or more.
     pub state: u32,
 }
 
@@ -38,7 +39,7 @@ impl Default for RecordingIntervals {
     }
 }
 
-/// Writes a recording of a simulation, step by step.
+/// Records a simulation, step by step.
 ///
 /// ```
 /// use drystone::{Body, Reference, Recorder, RecordingIntervals, Replay, Shape, Simulation, SolverConfig, World};
@@ -65,22 +66,22 @@ impl Default for RecordingIntervals {
 pub struct Recorder<W: Write> {
     out: W,
     intervals: RecordingIntervals,
-    /// The world as the last step left it.
+    /// The world after the last step.
     world: World,
     config: SolverConfig,
     asleep: Vec<bool>,
-    /// The number of the state that the last step left: [`Simulation::state`].
+    /// The number of the state after the last step: [`Simulation::state`].
     state: u64,
-    /// The shapes that the recording has.
+    /// The shapes that are already in the recording.
     shapes: Writer,
     steps: u32,
 }
 
 /// The first bytes of a recording.
 const MAGIC: [u8; 8] = *b"drystrec";
-/// The version of what follows them. It grows with every change of what is recorded.
+/// The format version. It grows with every change of the format.
 const VERSION: u32 = 2;
-/// Bytes before a part: its kind, its length and its hash.
+/// Size of the header of a part (bytes): its kind, its length and its hash.
 const PART: usize = 1 + 8 + 8;
 
 /// The kinds of parts.
@@ -88,28 +89,28 @@ const TITLE: u8 = 0;
 const STATE: u8 = 1;
 const STEP: u8 = 2;
 const END: u8 = 3;
-/// A state that the caller went to before the next step.
+/// A state that the caller restored or loaded before the next step.
 const JUMP: u8 = 4;
 
 /// One step of a recording.
 struct StepRecord {
     dt: f32,
     change: WorldChange,
-    /// The settings, if they are others.
+    /// The settings, if they changed.
     config: Option<SolverConfig>,
     /// Bodies that the caller woke.
     woken: Vec<u32>,
-    /// The hash of all bodies after the step, and of each a byte.
+    /// The hash of all bodies after the step, and one byte of hash for each body.
     hash: Option<(u64, Vec<u8>)>,
 }
 
 crate::saved::fields!(StepRecord { dt, change, config, woken, hash });
 
 impl<W: Write> Recorder<W> {
-    /// Begins a recording under a title, from the state of a simulation.
+    /// Starts a recording with a title, from the state of a simulation.
     ///
     /// # Errors
-    /// Nothing can be written there.
+    /// The writer fails.
     pub fn new(out: W, title: &str, simulation: &mut Simulation, intervals: RecordingIntervals) -> Result<Self> {
         let mut recorder = Self {
             out,
@@ -128,11 +129,11 @@ impl<W: Write> Recorder<W> {
         Ok(recorder)
     }
 
-    /// Steps the simulation, and notes what the caller changed since the last step. A simulation that the caller stepped, restored, loaded or
-    /// replaced since is noted as a whole.
+    /// Steps the simulation, and records the caller's changes since the last step. If the caller stepped, restored,
+    /// loaded or replaced the simulation since, it records the whole state.
     ///
     /// # Errors
-    /// As [`Simulation::step`], and the recording then has nothing of it; or nothing more can be written.
+    /// Those of [`Simulation::step`], after which the recording has no trace of the step; or the writer fails.
     pub fn step(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepStats> {
         let record = self.begin_step(simulation, dt)?;
         let stats = simulation.step(dt)?;
@@ -140,7 +141,7 @@ impl<W: Write> Recorder<W> {
         Ok(stats)
     }
 
-    /// As [`Self::step`], for a page ([`Simulation::step_async`]).
+    /// Like [`Self::step`], for a web page ([`Simulation::step_async`]).
     ///
     /// ```
     /// # use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
@@ -162,7 +163,7 @@ impl<W: Write> Recorder<W> {
     /// ```
     ///
     /// # Errors
-    /// As [`Simulation::step_async`], and the recording then has nothing of it; or nothing more can be written.
+    /// Those of [`Simulation::step_async`], after which the recording has no trace of the step; or the writer fails.
     pub async fn step_async(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepStats> {
         let record = self.begin_step(simulation, dt)?;
         let stats = simulation.step_async(dt).await?;
@@ -170,7 +171,7 @@ impl<W: Write> Recorder<W> {
         Ok(stats)
     }
 
-    /// What the caller changed since the last step.
+    /// The caller's changes since the last step.
     fn begin_step(&mut self, simulation: &mut Simulation, dt: f32) -> Result<StepRecord> {
         if self.state != simulation.state() {
             self.part(JUMP, &simulation.save())?;
@@ -183,7 +184,7 @@ impl<W: Write> Recorder<W> {
         Ok(StepRecord { dt, change, config, woken, hash: None })
     }
 
-    /// Writes a step that was made.
+    /// Writes a completed step.
     fn end_step(&mut self, mut record: StepRecord, simulation: &mut Simulation) -> Result<()> {
         self.steps += 1;
         record.hash = (self.steps.is_multiple_of(self.intervals.hash)).then(|| hashes(&simulation.world.bodies));
@@ -198,10 +199,10 @@ impl<W: Write> Recorder<W> {
         Ok(())
     }
 
-    /// Ends the recording with the hash of what the last step left.
+    /// Ends the recording with the hash of the last state.
     ///
     /// # Errors
-    /// Nothing more can be written.
+    /// The writer fails.
     pub fn finish(mut self) -> Result<W> {
         write_end(&mut self.out, &self.world)?;
         self.out.flush().map_err(Error::file("recording"))?;
@@ -226,12 +227,12 @@ impl<W: Write> Recorder<W> {
 }
 
 impl Recorder<Vec<u8>> {
-    /// The bytes that were written so far. The end is missing.
+    /// The bytes that are written so far, without the end.
     pub fn so_far(&self) -> &[u8] {
         &self.out
     }
 
-    /// The recording up to now with its end, while the recorder goes on.
+    /// A complete copy of the recording up to now. The recorder can go on.
     ///
     /// ```
     /// # use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
@@ -252,7 +253,7 @@ impl Recorder<Vec<u8>> {
     /// ```
     ///
     /// # Errors
-    /// As [`Recorder::finish`]; memory takes all that is written.
+    /// Those of [`Recorder::finish`]; writing to memory never fails.
     pub fn ended(&self) -> Result<Vec<u8>> {
         let mut all = self.out.clone();
         write_end(&mut all, &self.world)?;
@@ -275,7 +276,7 @@ fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
     write_part(out, END, &[&hash.to_le_bytes()[..], &bodies].concat())
 }
 
-/// Where a replay first went another way than the recording.
+/// The first difference between a replay and its recording.
 ///
 /// ```
 /// # use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
@@ -293,7 +294,7 @@ fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
 /// let mut replay = Replay::read(&bytes)?;
 /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
 /// replay.seek(&mut again, 6)?;
-/// // Someone meddles with the replay.
+/// // Disturb the replay.
 /// again.world.bodies[0].linear_velocity.x = 1.0;
 /// replay.step(&mut again)?;
 /// let difference: drystone::ReplayDifference = replay.first_difference().expect("the bodies differ");
@@ -304,26 +305,26 @@ fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ReplayDifference {
-    /// The step after which the hashes differ, from 1.
+    /// The step after which the hashes differ, counted from 1.
     pub step: u32,
-    /// The last step before it after which they agreed; 0 for the beginning.
+    /// The last earlier step after which the hashes agreed; 0 for the beginning.
     pub agreed: u32,
-    /// Index of the first body that differs; none where the hashes of bodies are too short to say.
+    /// Index of the first body that differs, or `None` if the short hashes of the bodies all agree.
     pub body: Option<usize>,
-    /// How many bodies differ at least.
+    /// Lower bound on the number of bodies that differ.
     pub bodies: usize,
 }
 
 /// A whole state of a recording.
 struct KeptState {
-    /// The steps before it.
+    /// The number of steps before it.
     step: u32,
-    /// Whether the caller went there, and the step before did not.
+    /// Whether the caller jumped to this state, so that the step before did not lead to it.
     is_jump: bool,
     bytes: Vec<u8>,
 }
 
-/// A recording that runs again, in a simulation of the caller.
+/// Replays a recording in a simulation of the caller.
 ///
 /// ```
 /// # use drystone::{Body, Cpu, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
@@ -344,7 +345,7 @@ struct KeptState {
 /// let mut again = replay.begin(Box::new(Cpu::new()))?;
 /// while replay.step(&mut again)?.is_some() {}
 /// assert!(again.hash() == hashes[9] && replay.first_difference().is_none());
-/// // Back to the fifth step, from the nearest state before it.
+/// // Go back to the fifth step, from the nearest earlier state.
 /// replay.seek(&mut again, 5)?;
 /// assert_eq!((again.hash(), replay.step_number()), (hashes[4], 5));
 /// assert!((replay.time() - 0.05).abs() < 1e-6);
@@ -352,7 +353,7 @@ struct KeptState {
 /// ```
 pub struct Replay {
     title: String,
-    /// Ascending by their steps.
+    /// Sorted by step.
     states: Vec<KeptState>,
     steps: Vec<StepRecord>,
     step: u32,
@@ -361,7 +362,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Whether these are the first bytes of a recording.
+    /// Whether the bytes begin like a recording.
     pub fn is_recording(bytes: &[u8]) -> bool {
         bytes.starts_with(&MAGIC)
     }
@@ -369,17 +370,17 @@ impl Replay {
     /// A replay of a recording, before its first step.
     ///
     /// # Errors
-    /// The bytes are none of a recording, of another version, damaged or cut short.
+    /// The bytes are not a recording, have another version, or are damaged or cut short.
     pub fn read(bytes: &[u8]) -> Result<Self> {
-        Self::read_parts(bytes).map_err(|error| error.within("a recording that cannot be replayed"))
+        Self::read_parts(bytes).map_err(|error| error.within("the recording cannot be replayed"))
     }
 
     fn read_parts(bytes: &[u8]) -> Result<Self> {
         let cut_short = || input!("cut short");
-        let rest = bytes.strip_prefix(&MAGIC).ok_or_else(|| input!("these bytes are none"))?;
+        let rest = bytes.strip_prefix(&MAGIC).ok_or_else(|| input!("these bytes are not a recording"))?;
         let (version, mut rest) = rest.split_first_chunk::<4>().ok_or_else(cut_short)?;
         let version = u32::from_le_bytes(*version);
-        ensure(version == VERSION, || format!("it has version {version}, and this program reads {VERSION}"))?;
+        ensure(version == VERSION, || format!("it has version {version}, but this program reads version {VERSION}"))?;
         let (mut title, mut states, mut steps) = (String::new(), Vec::<KeptState>::new(), Vec::<StepRecord>::new());
         let mut reader = Reader::new(&[]);
         loop {
@@ -408,25 +409,25 @@ impl Replay {
                     }
                     break;
                 }
-                kind => return Err(input!("a part of kind {kind} is not known")),
+                kind => return Err(input!("unknown kind of part: {kind}")),
             }
         }
-        ensure(rest.is_empty(), || "it goes on behind its end".into())?;
+        ensure(rest.is_empty(), || "it has bytes after its end".into())?;
         let begins = states.first().is_some_and(|state| state.step == 0 && !state.is_jump);
         ensure(begins, || "it has no beginning".into())?;
         Ok(Self { title, states, steps, step: 0, agreed: 0, difference: None })
     }
 
-    /// Goes to the beginning, in a simulation of its own.
+    /// Goes to the beginning, in a new simulation.
     ///
     /// # Errors
-    /// The state of the beginning is damaged.
+    /// The first state is damaged.
     pub fn begin(&mut self, backend: Box<dyn Backend>) -> Result<Simulation> {
         (self.step, self.agreed, self.difference) = (0, 0, None);
         Simulation::load(&self.states[0].bytes, backend)
     }
 
-    /// The title.
+    /// The title of the recording.
     pub fn title(&self) -> &str {
         &self.title
     }
@@ -436,35 +437,36 @@ impl Replay {
         self.steps.len() as u32
     }
 
-    /// Whether it has no steps.
+    /// Whether the recording has no steps.
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty()
     }
 
-    /// The steps that are made.
+    /// The number of steps that are replayed so far.
     pub fn step_number(&self) -> u32 {
         self.step
     }
 
-    /// Simulated time until here (s).
+    /// Simulated time so far (s).
     pub fn time(&self) -> f64 {
         self.steps[..self.step as usize].iter().map(|step| f64::from(step.dt)).sum()
     }
 
-    /// Length of the next step, or of the last one at the end (s); none without steps.
+    /// Length of the next step, or of the last one at the end (s); `None` without steps.
     pub fn dt(&self) -> Option<f32> {
         self.steps.get(self.step as usize).or(self.steps.last()).map(|step| step.dt)
     }
 
-    /// Where the replay first went another way than the recording, in the steps that were made so far.
+    /// The first difference from the recording, within the steps that are replayed so far.
     pub fn first_difference(&self) -> Option<ReplayDifference> {
         self.difference
     }
 
-    /// Makes the next step in the simulation that the replay began, as it left it; none at the end.
+    /// Replays the next step in the simulation that the replay began. The caller must not change that simulation.
+    /// Returns `None` at the end.
     ///
     /// # Errors
-    /// As [`Simulation::step`].
+    /// Those of [`Simulation::step`].
     pub fn step(&mut self, simulation: &mut Simulation) -> Result<Option<StepStats>> {
         let Some(dt) = self.begin_step(simulation)? else { return Ok(None) };
         let stats = simulation.step(dt)?;
@@ -472,10 +474,10 @@ impl Replay {
         Ok(Some(stats))
     }
 
-    /// As [`Self::step`], for a page ([`Simulation::step_async`]). [`Recorder::step_async`] has an example.
+    /// Like [`Self::step`], for a web page ([`Simulation::step_async`]). [`Recorder::step_async`] has an example.
     ///
     /// # Errors
-    /// As [`Simulation::step_async`].
+    /// Those of [`Simulation::step_async`].
     pub async fn step_async(&mut self, simulation: &mut Simulation) -> Result<Option<StepStats>> {
         let Some(dt) = self.begin_step(simulation)? else { return Ok(None) };
         let stats = simulation.step_async(dt).await?;
@@ -483,7 +485,7 @@ impl Replay {
         Ok(Some(stats))
     }
 
-    /// Makes the changes of the caller before the next step, and gives its length (s); none at the end.
+    /// Makes the caller's changes before the next step. Returns the length of that step (s), or `None` at the end.
     fn begin_step(&mut self, simulation: &mut Simulation) -> Result<Option<f32>> {
         if self.step == self.len() {
             return Ok(None);
@@ -500,7 +502,7 @@ impl Replay {
         Ok(Some(record.dt))
     }
 
-    /// Compares the bodies after a step that was made.
+    /// Compares the bodies after a completed step.
     fn end_step(&mut self, simulation: &Simulation) {
         let record = &self.steps[self.step as usize];
         self.step += 1;
@@ -518,10 +520,10 @@ impl Replay {
         }
     }
 
-    /// Goes to the state after so many steps, or to the end: from the nearest state that the recording kept before it.
+    /// Goes to the state after `step` steps, or to the end. It starts from the nearest earlier state in the recording.
     ///
     /// # Errors
-    /// As [`Simulation::step`].
+    /// Those of [`Simulation::step`].
     pub fn seek(&mut self, simulation: &mut Simulation, step: u32) -> Result<()> {
         let step = self.near(simulation, step)?;
         while self.step < step {
@@ -530,7 +532,7 @@ impl Replay {
         Ok(())
     }
 
-    /// As [`Self::seek`], for a page.
+    /// Like [`Self::seek`], for a web page.
     ///
     /// ```
     /// use drystone::{Body, Recorder, RecordingIntervals, Reference, Replay, Shape, Simulation, SolverConfig, World};
@@ -550,7 +552,7 @@ impl Replay {
     /// ```
     ///
     /// # Errors
-    /// As [`Simulation::step_async`].
+    /// Those of [`Simulation::step_async`].
     pub async fn seek_async(&mut self, simulation: &mut Simulation, step: u32) -> Result<()> {
         let step = self.near(simulation, step)?;
         while self.step < step {
@@ -559,7 +561,8 @@ impl Replay {
         Ok(())
     }
 
-    /// Goes to the nearest state that the recording kept before a step, unless it is nearer by itself; gives the step, the last one at most.
+    /// Loads the last recorded state before a step, unless the present state is nearer. Returns the step, at most the
+    /// last one.
     fn near(&mut self, simulation: &mut Simulation, step: u32) -> Result<u32> {
         let step = step.min(self.len());
         let nearest = self.states.iter().rposition(|state| state.step <= step && !state.is_jump);
@@ -570,7 +573,7 @@ impl Replay {
         Ok(step)
     }
 
-    /// Goes to a kept state.
+    /// Loads a recorded state.
     fn load(&mut self, simulation: &mut Simulation, state: usize) -> Result<()> {
         let backend = simulation.set_backend(Box::new(Reference::<f32>::new()));
         *simulation = Simulation::load(&self.states[state].bytes, backend)?;

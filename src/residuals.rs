@@ -1,14 +1,14 @@
-//! How far impulses are from solving a contact problem, in f64, from the problem and the impulses alone.
+//! Errors of impulses for a contact problem, in f64. They depend only on the problem and the impulses.
 //!
-//! The natural map of a contact compares its impulse r with the projection on Coulomb's cone K of r less a step along the
-//! velocity, F = r - P_K(r - rho (u + mu |u_t| n)); it is zero exactly at a solution, for every rho > 0 (De Saxcé and
-//! Feng 1998; Acary, Brémond and Huber 2018).
+//! The natural map of a contact compares its impulse r with the projection on Coulomb's cone K of r minus a step along
+//! the velocity: F = r - P_K(r - rho (u + mu |u_t| n)). For every rho > 0, it is zero exactly at a solution (De Saxcé
+//! and Feng 1998; Acary, Brémond and Huber 2018).
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::contacts::{ContactProblem, LocalProblem, Operator, Velocity};
 
-/// The errors of impulses. All numbers are NaN if any of them is not finite.
+/// The errors of impulses. All of them are NaN if any of them is not finite.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -21,7 +21,7 @@ use crate::contacts::{ContactProblem, LocalProblem, Operator, Velocity};
 /// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
 /// use drystone::residuals::Residuals;
 ///
-/// // The ball stops to fall, and goes on sliding at 0.7 m/s against all friction there is.
+/// // The ball stops falling, and slides on at 0.7 m/s against full friction.
 /// let solved = Residuals::of(&problem, &[DVec3::new(6.0, 0.0, -0.6)]);
 /// assert!(solved.e_vel < 1e-12 && solved.cone < 1e-12);
 /// // Without impulses it approaches the ground.
@@ -31,41 +31,42 @@ use crate::contacts::{ContactProblem, LocalProblem, Operator, Velocity};
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Residuals {
-    /// The natural map in velocities: the norm of F/rho over all contacts with rho = 3/trace(W_ii), over the norm of
-    /// the free relative velocities. Independent of units; the number to steer by.
+    /// The natural map in velocities: the norm of F/rho over all contacts with rho = 3/trace(W_ii), divided by the norm
+    /// of the free relative velocities. It does not depend on units. Use this number for decisions.
     pub e_vel: f64,
-    /// The natural map with rho = 1, as published error curves have it: impulses and velocities are added as numbers, so it
+    /// The natural map with rho = 1, like published error curves. It adds impulses and velocities as numbers, so it
     /// depends on units.
     pub e_fclib: f64,
-    /// Largest share of one contact in `e_vel`, |F|/rho (m/s).
+    /// The largest contribution of one contact to `e_vel`, |F|/rho (m/s).
     pub vmax: f64,
-    /// Which contact that is; none without contacts.
+    /// The contact with this contribution; `None` without contacts.
     pub worst_contact: Option<usize>,
-    /// Fastest approach of two surfaces that touch (m/s).
+    /// Largest approach speed of two touching surfaces (m/s).
     pub pen_rate: f64,
-    /// Largest |u_n r_n| (J): contacts that push while they part.
+    /// Largest |u_n r_n| (J): the contact pushes although it separates.
     pub compl: f64,
-    /// Farthest that an impulse is outside of its cone, |r_t| - mu r_n or -r_n (N s).
+    /// Largest distance of an impulse from its cone, |r_t| - mu r_n or -r_n (N s).
     pub cone: f64,
-    /// Largest |u_t · r_t + mu r_n |u_t|| (J): friction that does not oppose its slip with all it has.
+    /// Largest |u_t · r_t + mu r_n |u_t|| (J): friction does not fully oppose the slip.
     pub diss: f64,
-    /// Drift of the velocities that a solver carried along from those of its impulses, over the free velocities, both in the
-    /// norm of kinetic energy.
+    /// Difference between the velocities that a solver carried and those of its impulses, relative to the free
+    /// velocities, both in the norm of kinetic energy.
     pub eom: f64,
 }
 
 impl Residuals {
-    /// Of `impulses`, one a contact in its coordinates (N s). To measure many times, keep a [`Measure`].
+    /// The errors of `impulses`, one for each contact in its coordinates (N s). Keep a [`Measure`] to measure many
+    /// times.
     ///
     /// # Panics
-    /// There is not one impulse a contact.
+    /// The number of impulses differs from the number of contacts.
     pub fn of(problem: &ContactProblem, impulses: &[DVec3]) -> Self {
         let measure = Measure::new(problem);
         measure.of(impulses, &measure.operator.velocities(impulses))
     }
 
-    /// Of impulses of a problem without bodies, one a contact in its coordinates (N s). Nothing carries velocities, so nothing
-    /// drifts.
+    /// The errors of impulses for a problem without bodies, one for each contact in its coordinates (N s). No
+    /// velocities are carried, so `eom` is zero.
     ///
     /// ```
     /// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
@@ -77,7 +78,7 @@ impl Residuals {
     /// ```
     ///
     /// # Panics
-    /// There is not one impulse a contact.
+    /// The number of impulses differs from the number of contacts.
     pub fn of_blocks(problem: &LocalProblem, impulses: &[DVec3]) -> Self {
         assert_eq!(impulses.len(), problem.rows.len(), "one impulse a contact");
         let contact = |i: usize| At {
@@ -124,7 +125,7 @@ impl Residuals {
         [e_vel, e_fclib, vmax, pen_rate, compl, cone, diss, eom]
     }
 
-    /// NaN spoils everything: no number that is left looks better than it is.
+    /// Any NaN makes all numbers NaN, so that no remaining number looks better than it is.
     fn spoiled(mut self) -> Self {
         if self.numbers_mut().iter().any(|x| !x.is_finite()) {
             self.numbers_mut().into_iter().for_each(|x| *x = f64::NAN);
@@ -133,7 +134,7 @@ impl Residuals {
     }
 }
 
-/// What the errors of a contact depend on.
+/// The data of a contact that its errors depend on.
 struct At {
     mu: f64,
     rho: f64,
@@ -146,7 +147,7 @@ fn step(block: DMat3) -> f64 {
     3.0 / (block.x_axis.x + block.y_axis.y + block.z_axis.z)
 }
 
-/// A problem with what does not depend on the impulses.
+/// A problem with the data that does not depend on the impulses.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -172,7 +173,7 @@ pub struct Measure<'a> {
 }
 
 impl<'a> Measure<'a> {
-    /// Of a problem.
+    /// Prepares the measurement of a problem.
     pub fn new(problem: &'a ContactProblem) -> Self {
         let operator = Operator::new(problem);
         let steps = (0..problem.contacts.len()).map(|i| step(operator.block(i))).collect();
@@ -182,10 +183,11 @@ impl<'a> Measure<'a> {
         Self { operator, steps, free_norm }
     }
 
-    /// Of `impulses`, one a contact in its coordinates (N s), and the velocities that a solver carried along with them.
+    /// The errors of `impulses`, one for each contact in its coordinates (N s), with the velocities that a solver
+    /// carried.
     ///
     /// # Panics
-    /// There is not one impulse a contact and one velocity a body.
+    /// The number of impulses differs from the number of contacts, or that of velocities from that of bodies.
     pub fn of(&self, impulses: &[DVec3], carried: &[Velocity]) -> Residuals {
         assert_eq!(carried.len(), self.operator.problem().bodies.len(), "one velocity a body");
         let velocities = self.operator.velocities(impulses);
@@ -216,7 +218,7 @@ pub(crate) fn natural_map(mu: f64, r: DVec3, u: DVec3, rho: f64) -> DVec3 {
     r - projected_on_cone(mu, r - (u + DVec3::X * (mu * slip)) * rho)
 }
 
-/// The point of |x_t| <= mu x_n that is nearest to x.
+/// The point of the cone |x_t| <= mu x_n that is nearest to x.
 fn projected_on_cone(mu: f64, x: DVec3) -> DVec3 {
     let length = DVec2::new(x.y, x.z).length();
     if mu * length <= -x.x {
@@ -230,12 +232,12 @@ fn projected_on_cone(mu: f64, x: DVec3) -> DVec3 {
     }
 }
 
-/// 0 of nothing is nothing.
+/// The ratio of two numbers; 0 divided by 0 is 0.
 fn ratio(x: f64, y: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x / y }
 }
 
-/// The largest of some numbers, 0 if all are less, NaN if any is.
+/// The largest of some numbers: 0 if all are negative, NaN if any is NaN.
 #[derive(Default)]
 struct Largest {
     value: f64,

@@ -37,8 +37,8 @@ pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 pub use rollback::Rollback;
 pub use saved::Snapshot;
 
-/// A step that is assembled and did not run. It is not assembled again if the caller changes nothing, because preloads and efforts follow
-/// the impulses of the step before only once.
+/// A step that is assembled but did not run. If the caller changes nothing, the next call does not assemble it again:
+/// preloads and substep levels may follow the impulses of the step before only once.
 struct Unfinished {
     dt: f32,
     /// The world and the settings, as bytes.
@@ -46,7 +46,7 @@ struct Unfinished {
     stats: StepStats,
 }
 
-/// A world that moves.
+/// Steps a world.
 ///
 /// ```
 /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
@@ -76,7 +76,7 @@ struct Unfinished {
 /// for _ in 0..60 {
 ///     simulation.step(1.0 / 60.0)?;
 /// }
-/// // Contacts as the last step left them, and how deep bodies overlap: as the step began, and now.
+/// // Contacts of the last step, and the overlap of bodies: at its start, and now.
 /// let borne: f32 = simulation.manifolds().map(|manifold| manifold.normal_impulse()).sum();
 /// assert!((borne * 480.0 - 9810.0).abs() < 100.0, "{borne} N s in a substep of 1/480 s");
 /// assert!(simulation.solved_penetration().max < 1e-3 && simulation.penetration().max < 1e-3);
@@ -84,11 +84,11 @@ struct Unfinished {
 /// // Joints: the lamp hangs on its hinge.
 /// assert!((simulation.joint_impulses()[0].length() * 480.0 - 19.62).abs() < 0.1);
 /// assert!(simulation.joint_angular_impulses()[0].length() < 1e-3);
-/// // What rests sleeps, and takes the substeps of the settings.
+/// // Bodies at rest sleep, and take the substeps of the settings.
 /// assert!(simulation.is_asleep(brick) && simulation.substeps_of(brick) == simulation.config().substeps);
 /// simulation.wake(brick);
 /// assert!(!simulation.is_asleep(brick));
-/// // Settings and backend may change. The next step is a value.
+/// // Settings and backend can change. The next step is available as a value.
 /// simulation.set_config(SolverConfig::default().with(|c| c.substeps = 4))?;
 /// let before = simulation.set_backend(Box::new(drystone::Cpu::new()));
 /// assert_eq!((before.name(), simulation.backend().name()), ("reference", "cpu"));
@@ -99,37 +99,38 @@ struct Unfinished {
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub struct Simulation {
-    /// The bodies, with their moments of inertia raised where they are too small ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)).
-    /// Between steps, all of it may change: bodies and joints may come and go, and gravity, poses, velocities, forces, masses, materials, kinds and
-    /// shapes may become others. The next step finds the changes, and refuses what [`World::check`] refuses. Contacts of bodies
-    /// that stay keep their impulses, but for those of a
-    /// body that changed its kind or shapes.
+    /// The bodies, with moments of inertia raised where they are too small
+    /// ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)). The caller can change all of it
+    /// between steps: insert and remove bodies and joints, and set gravity, poses, velocities, forces, masses,
+    /// materials, kinds and shapes. The next step finds the changes, and refuses a world that [`World::check`] refuses.
+    /// Contacts keep their impulses, except those of a body that changed its kind or shapes.
     pub world: World,
     config: SolverConfig,
     backend: Box<dyn Backend>,
-    /// All state that lasts from step to step, except the copy of a device.
+    /// All state that lasts from step to step, except the copy on a device.
     stages: Stages,
     /// Whether the backend keeps the rows of the last step on a device.
     on_device: bool,
-    /// The step that is assembled and did not run, because the backend failed.
+    /// A step that is assembled but did not run, because the backend failed.
     unfinished: Option<Box<Unfinished>>,
-    /// The number of the state that the last step, `load` or `restore` left. No other state of the process has it.
+    /// The number of the state after the last step, `load` or `restore`. No other state of this process has the same
+    /// number.
     state: u64,
-    /// Whether the future of a step is pending, or was dropped before its end.
+    /// Whether the future of a step is pending, or was dropped before it completed.
     is_pending: bool,
 }
 
-/// A number that no state has yet.
+/// A new state number.
 fn next_state() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(0);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 impl Simulation {
-    /// A simulation of `world` that has not moved yet.
+    /// A simulation of `world` before its first step.
     ///
     /// # Errors
-    /// A setting is out of range or contradicts another; a body or joint of the world is not fit to be simulated.
+    /// A setting is out of range or contradicts another, or [`World::check`] refuses the world.
     pub fn new(mut world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         config.check()?;
         world.check()?;
@@ -140,7 +141,7 @@ impl Simulation {
 
     /// The simulation of a state between two steps.
     fn between_steps(world: World, config: SolverConfig, stages: Stages, backend: Box<dyn Backend>) -> Self {
-        // The threads of a process begin here, and not within its first step.
+        // Start the threads of the process here, not within its first step.
         rayon::current_num_threads();
         Self {
             world,
@@ -154,13 +155,18 @@ impl Simulation {
         }
     }
 
-    /// Moves the world by `dt` seconds. If all bodies sleep, it computes nothing.
+    /// Advances the world by `dt` seconds. If all bodies sleep, the step computes nothing.
     ///
     /// # Errors
-    /// `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to [`LONGEST_STEP`](crate::config::LONGEST_STEP); a body
-    /// that came or changed, a joint or a mass is not fit to be simulated; the caller gave a body a pose, a velocity, a force or a torque
-    /// that [`World::check`] refuses; the backend cannot run the step; a contact cannot be computed ([`Error::Panicked`]). The world
-    /// is then as it was. After a contact that cannot be computed all bodies are awake, and contacts begin without impulses.
+    /// - `dt` is not from [`SHORTEST_STEP`](crate::config::SHORTEST_STEP) to
+    ///   [`LONGEST_STEP`](crate::config::LONGEST_STEP).
+    /// - [`World::check`] refuses a new or changed body, a joint, a mass, or a pose, velocity, force or torque that the
+    ///   caller set.
+    /// - The backend cannot run the step.
+    /// - A contact cannot be computed ([`Error::Panicked`]).
+    ///
+    /// The world is then unchanged. If a contact cannot be computed, all bodies wake, and contacts start without
+    /// impulses.
     pub fn step(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
         if self.begin_step(dt, &mut stats)? {
@@ -169,7 +175,8 @@ impl Simulation {
         Ok(stats)
     }
 
-    /// As [`Self::step`], for a page: other tasks go on while a device works. On the CPU the step ends before the first wait.
+    /// Like [`Self::step`], for a web page: other tasks continue while a device works. On the CPU the step completes
+    /// before the first await.
     ///
     /// ```
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
@@ -183,7 +190,8 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::step`]; and of each step after one whose future was dropped before its end, until the simulation goes back to a snapshot.
+    /// Those of [`Self::step`]. If the future of a step is dropped before it completes, each later step fails until the
+    /// simulation restores a snapshot.
     pub async fn step_async(&mut self, dt: f32) -> Result<StepStats> {
         let mut stats = StepStats::default();
         if self.begin_step(dt, &mut stats)? {
@@ -195,11 +203,11 @@ impl Simulation {
         Ok(stats)
     }
 
-    /// Lets the steps from now on tell of contacts and hits, and add up impulses over their substeps. The first step after that tells of all
-    /// contacts that touch already.
+    /// Makes later steps report contacts and hits, and sum impulses over their substeps. The first such step reports
+    /// every contact that already touches.
     ///
     /// # Errors
-    /// The approach speed is no number, or below 0; what the simulation listens to is then as it was.
+    /// The approach speed is NaN or below 0. The simulation then listens to the same events as before.
     pub fn listen(&mut self, listen: Listen) -> Result<()> {
         listen.check()?;
         self.on_device = false;
@@ -207,23 +215,26 @@ impl Simulation {
         Ok(())
     }
 
-    /// What the simulation listens to.
+    /// The events and sums that the simulation reports.
     pub fn listening(&self) -> Listen {
         self.stages.events.listen
     }
 
-    /// The sensors of the world, each with the colliders that overlapped it after the last step: first the sensor, then the other one.
-    /// Ascending by the indices of both bodies.
+    /// Pairs of a sensor and a collider that overlapped it after the last step. The sensor comes first. Pairs are
+    /// sorted by the indices of both bodies.
     pub fn overlaps(&self) -> &[[ColliderOf; 2]] {
         self.stages.events.inside()
     }
 
-    /// What happened in the last step: contacts that ended or began, then hits, then what entered or left sensors ([`Body::sensor`]), then what flew through them, each
-    /// ascending by the pairs of bodies, then joints that broke, ascending. Contacts and hits are told of where the simulation [listens](Self::listen). Empty after a step that
-    /// failed. The order and the numbers are the same for any backend with the same bits.
+    /// The events of the last step: contacts that ended or began, then hits, then colliders that entered or left
+    /// sensors ([`Body::sensor`]), then colliders that flew through sensors, and then joints that broke. Each group is
+    /// sorted by pairs of bodies, and joints by index. The simulation reports contacts and hits only if it
+    /// [listens](Self::listen) to them. The list is empty after a step that failed. Backends that compute the same bits
+    /// report the same events in the same order.
     ///
-    /// Two colliders touch in a step where their surfaces press on each other in the course of the step, or overlap when it begins. A contact
-    /// that is only near does not touch. Bodies that sleep go on touching. Where a body goes, the next step tells that its contacts ended.
+    /// Two colliders touch in a step if their surfaces press on each other during the step, or overlap at its start. A
+    /// contact that is only near does not touch. Sleeping bodies keep touching. If a body is removed, the next step
+    /// reports that its contacts ended.
     ///
     /// ```
     /// use drystone::{Body, Event, Listen, Reference, Shape, Simulation, SolverConfig, World};
@@ -247,8 +258,8 @@ impl Simulation {
         &self.stages.events.all
     }
 
-    /// Moves the world by `dt` seconds, and gives what the first substep asked of the velocities as a contact problem by
-    /// itself: [`ContactProblem::of_step`]. Without contacts where nothing touches that is awake.
+    /// Advances the world by `dt` seconds, and returns the contact problem that the first substep solved:
+    /// [`ContactProblem::of_step`]. The problem has no contacts if no awake body touches another.
     ///
     /// ```
     /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
@@ -262,11 +273,11 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// As [`Simulation::step`], or the world has joints: a contact problem has none.
+    /// Those of [`Simulation::step`]; or the world has joints, which a contact problem cannot have.
     pub fn step_with_contacts(&mut self, name: &str, dt: f32) -> Result<(ContactProblem, StepStats)> {
         if !self.world.joints.is_empty() {
             let joints = self.world.joints.len();
-            return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
+            return Err(Error::input(format!("{name} has {joints} joints: a contact problem cannot have joints")));
         }
         self.on_device = false;
         let mut stats = StepStats::default();
@@ -293,7 +304,7 @@ impl Simulation {
         Ok((contacts, stats))
     }
 
-    /// The changes of the caller since the last step.
+    /// The caller's changes since the last step.
     fn changes(&mut self, dt: f32) -> Result<Changes> {
         let changes = self.stages.changes(&self.world, &self.config, dt)?;
         if changes.surfaces() {
@@ -302,12 +313,12 @@ impl Simulation {
         Ok(changes)
     }
 
-    /// Assembles a step; false if there is nothing to do in it.
+    /// Assembles a step. Returns false if the step has nothing to do.
     pub(crate) fn begin_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<bool> {
         self.stages.events.all.clear();
         check_step_length(dt)?;
         if self.is_pending {
-            return Err(Error::input("a step was dropped before its end: go back to a snapshot"));
+            return Err(Error::input("the future of a step was dropped before it completed: restore a snapshot"));
         }
         if let Some(unfinished) = self.unfinished.take()
             && unfinished.dt == dt
@@ -342,7 +353,7 @@ impl Simulation {
         Ok(is_assembled)
     }
 
-    /// Gives up the state between steps, which a panic left half done: the next step finds all contacts anew.
+    /// Discards the state between steps after a panic left it incomplete. The next step finds all contacts anew.
     fn begin_anew(&mut self) {
         let (listen, astray) = (self.stages.events.listen, std::mem::take(&mut self.stages.astray));
         self.stages = Stages::new(&World::new(), &self.config);
@@ -357,7 +368,7 @@ impl Simulation {
         Error::Panicked(format!("{what} cannot be computed: {text}"))
     }
 
-    /// Runs and stores what is assembled.
+    /// Runs the assembled step and stores its results.
     pub(crate) fn end_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
         loop {
             let (step, carry) = assembled(&mut self.stages);
@@ -370,7 +381,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// The same, while other tasks go on.
+    /// The same, while other tasks continue.
     async fn end_step_async(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
         loop {
             let (step, carry) = assembled(&mut self.stages);
@@ -385,7 +396,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Stores what ran.
+    /// Stores the results of the step that ran.
     pub(crate) fn store_step(&mut self, dt: f32, stats: &mut StepStats) {
         let stages = &mut self.stages;
         self.on_device = self.backend.keeps_rows();
@@ -402,16 +413,17 @@ impl Simulation {
         stats.first_non_finite = self.stages.astray.iter().find(|i| !is_finite(i)).copied();
     }
 
-    /// Refuses rows that follow from state which someone forged.
+    /// Refuses rows that follow from forged state.
     fn check_foreign(&mut self) -> Result<()> {
         let checked = CheckedStep::new(&mut self.stages.problem, &self.stages.plan.passes).map(drop);
         checked.map_err(|error| {
             self.begin_anew();
-            error.within("the state that was loaded")
+            error.within("the loaded state")
         })
     }
 
-    /// Lets another backend repeat a step whose device was lost. Without one the step is left to the caller.
+    /// Repeats the step on another backend after its device was lost. Without another backend, the caller has to handle
+    /// the loss.
     fn repeat_step(
         &mut self,
         error: Error,
@@ -428,15 +440,15 @@ impl Simulation {
         };
         let before = stats.fault.take().map_or(String::new(), |line| format!("{line}; "));
         let (name, adapter) = (successor.name(), successor.adapter());
-        stats.fault = Some(format!("{before}{error}; {name} ({adapter}) repeats the step and goes on"));
+        stats.fault = Some(format!("{before}{error}; {name} ({adapter}) repeats the step and continues"));
         self.backend = successor;
         Ok(())
     }
 
-    /// The next step of `dt` seconds as values, the problem and its plan. The call changes nothing of the run.
+    /// The problem and the plan of the next step of `dt` seconds. The call does not change the run.
     ///
     /// # Errors
-    /// As [`Simulation::step`], the backend apart.
+    /// Those of [`Simulation::step`], except errors of the backend.
     pub fn next_problem(&mut self, dt: f32) -> Result<(StepProblem, StepPlan)> {
         check_step_length(dt)?;
         let changes = self.changes(dt)?;
@@ -451,8 +463,8 @@ impl Simulation {
         assembled.map_err(|panic| self.panicked(panic))
     }
 
-    /// The bodies as they are now, for questions: rays, shapes that move, points, boxes. In the tree of the last step, so that this costs
-    /// as much as a look at each body. Keep the answer for many questions.
+    /// A view of the bodies at their present poses, for rays, shape casts, points and boxes. It uses the tree of the
+    /// last step, so the cost is one look at each body. Keep the view for many queries.
     ///
     /// ```
     /// use drystone::queries::Filter;
@@ -472,7 +484,7 @@ impl Simulation {
         Queries::standing(&self.world, &self.stages.detector)
     }
 
-    /// The world, without all that the next step would begin from.
+    /// The world, without the solver state for the next step.
     pub fn into_world(self) -> World {
         self.world
     }
@@ -482,30 +494,32 @@ impl Simulation {
         self.stages.sleep.asleep().get(body) == Some(&true)
     }
 
-    /// The number of the state that the last step, `load` or `restore` left: no other state of the process has it. Steps in which all sleep
-    /// leave the state as it was.
+    /// The number of the state after the last step, `load` or `restore`. No other state of this process has the same
+    /// number. A step in which all bodies sleep keeps the number.
     pub(crate) fn state(&self) -> u64 {
         self.state
     }
 
-    /// Whether each body sleeps; empty if none ever does.
+    /// Whether each body sleeps; empty if sleep is off.
     pub(crate) fn asleep(&self) -> &[bool] {
         self.stages.sleep.asleep()
     }
 
-    /// The substeps that a body takes in a step; see [`SolverConfig::max_substeps`]. The least for an index without a body.
+    /// The number of substeps that a body takes in a step; see [`SolverConfig::max_substeps`]. For an index without a
+    /// body, the smallest number of the world.
     pub fn substeps_of(&self, body: usize) -> u32 {
         self.config.substeps << self.stages.effort.class_of(body)
     }
 
-    /// Wakes the island of a body, if the body sleeps. A change of a sleeping body itself, of gravity or of a
-    /// joint wakes it anyway.
+    /// Wakes the island of a body, if the body sleeps. A change of a sleeping body, of gravity or of a joint wakes it
+    /// without this call.
     pub fn wake(&mut self, body: usize) {
         self.stages.sleep.wake(body);
     }
 
-    /// Overlap of the world as it is now, from contacts computed anew. The call does not change the next step: towers of 60
-    /// that stand for 20 s fall if their contacts are recomputed now and then, since reused contacts do not creep.
+    /// Overlap of the world at its present poses, from contacts that are computed anew. The call does not change the
+    /// next step: a reused contact does not creep, and towers of 60 that stand for 20 s fall if their contacts are
+    /// recomputed now and then.
     pub fn penetration(&self) -> Penetration {
         Penetration::of_world(&self.world, &self.config)
     }
@@ -516,14 +530,15 @@ impl Simulation {
         manifolds::of(detector, contacts, problem, self.stages.least_substeps())
     }
 
-    /// The contacts that the last step found, near ones included, in no particular order that holds from step to step. No device is asked:
-    /// impulses are there where the simulation [listens](Self::listen). Those of bodies that went since are left out.
+    /// The contacts that the last step found, also near ones, in an order that can change from step to step. The call
+    /// reads nothing from a device: impulses are available if the simulation [listens](Self::listen). It leaves out
+    /// contacts of bodies that were removed since.
     pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
         self.stages.contacts.taken().filter_map(|row| contacts::contact(&self.stages, &self.world, row))
     }
 
-    /// The contacts of a body, likewise; none if it is gone. Where the simulation listens, the cost is that of the contacts of the body, and
-    /// else that of all contacts.
+    /// The contacts of a body; no contacts if the body is gone. If the simulation listens, the call looks only at the
+    /// contacts of the body, else at all contacts.
     ///
     /// ```
     /// use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, World};
@@ -551,36 +566,36 @@ impl Simulation {
         contacts.filter(move |contact| contact.a.body == body || contact.b.body == body)
     }
 
-    /// Overlap when the last step began, from the contacts that it went by.
+    /// Overlap at the start of the last step, from the contacts of that step.
     pub fn solved_penetration(&self) -> Penetration {
         let separations = |m: SolvedManifold| (0..m.points().len()).map(move |k| m.points()[k].separation);
         Penetration::of(self.manifolds().map(separations))
     }
 
-    /// Impulse of each joint of the world on its body b, in the last of the substeps ([`Self::substeps_of`]), world axes (N s).
+    /// Impulse of each joint on its body b in the last substep ([`Self::substeps_of`]), in world axes (N s).
     pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
         let problem = &self.stages.problem;
         (0..problem.joints.len()).map(|joint| problem.joint_impulse(&problem.joint_impulses, joint)).collect()
     }
 
-    /// Angular impulse of each joint of the world on its body b about the anchor, in the last of the substeps, world axes (N m s): that of
-    /// locks, limits, motors and springs of angles. A torque (N m) is that over the length of the substep.
+    /// Angular impulse of each joint on its body b about the anchor in the last substep, in world axes (N m s). It sums
+    /// the locks, limits, motors and springs of angles. Divide by the length of the substep for a torque (N m).
     pub fn joint_angular_impulses(&self) -> Vec<glam::Vec3> {
         let problem = &self.stages.problem;
         (0..problem.joints.len()).map(|joint| problem.axis_impulse(&problem.joint_impulses, joint, false)).collect()
     }
 
-    /// Changes the settings from the next step on.
+    /// Sets the settings for the next step and later ones.
     ///
     /// # Errors
-    /// One is out of range or contradicts another; they are then as they were.
+    /// A setting is out of range or contradicts another. The settings are then unchanged.
     pub fn set_config(&mut self, config: SolverConfig) -> Result<()> {
         config.check()?;
         self.config = config;
         Ok(())
     }
 
-    /// Changes what runs the steps, from the next one on; returns what ran them so far.
+    /// Sets the backend for the next step and later ones. Returns the previous backend.
     pub fn set_backend(&mut self, backend: Box<dyn Backend>) -> Box<dyn Backend> {
         self.on_device = false;
         std::mem::replace(&mut self.backend, backend)
@@ -591,17 +606,17 @@ impl Simulation {
         &self.config
     }
 
-    /// The last step's problem, with the impulses that solved it.
+    /// The problem of the last step, with the impulses that solved it.
     pub fn problem(&self) -> &StepProblem {
         &self.stages.problem
     }
 
-    /// The step that is assembled, for others to run.
+    /// The assembled step, for another program part to run.
     pub(crate) fn problem_mut(&mut self) -> &mut StepProblem {
         &mut self.stages.problem
     }
 
-    /// The last step's plan.
+    /// The plan of the last step.
     pub fn plan(&self) -> &StepPlan {
         &self.stages.plan
     }
@@ -612,7 +627,7 @@ impl Simulation {
     }
 }
 
-/// What is assembled, for a backend.
+/// The assembled step, for a backend.
 fn assembled(stages: &mut Stages) -> (CheckedStep<'_>, &Carry) {
     (CheckedStep::built(&mut stages.problem, &stages.plan.passes), &stages.contacts.carry)
 }

@@ -1,7 +1,7 @@
-//! The stages of a step one by one, and what the command shares with the library.
+//! The stages of a step, and code that the command shares with the library.
 //!
-//! Tests, measurements and backends need these parts; a program that steps a [`Simulation`](crate::Simulation) does not. They change
-//! from version to version.
+//! Tests, measurements and backends need these parts. A program that steps a [`Simulation`](crate::Simulation) does not
+//! need them. They change from version to version.
 
 /// Contacts: tree over boxes, then persistent manifolds.
 pub mod collide {
@@ -13,7 +13,7 @@ pub mod effort {
     pub use crate::effort::*;
 }
 
-/// Colors: no body twice in one.
+/// Colors: no body occurs twice in one color.
 pub mod graph {
     pub use crate::graph::*;
 }
@@ -28,17 +28,17 @@ pub mod plan {
     pub use crate::plan::*;
 }
 
-/// What a pass does to its rows; every function of a shader has a double of the same name here.
+/// The effect of a pass on its rows. Every function of a shader has a twin of the same name here.
 pub mod kernels {
     pub use crate::kernels::*;
 }
 
-/// The arithmetic of kernels, over one number or many.
+/// The arithmetic of kernels, for one number or many.
 pub mod math {
     pub use crate::math::*;
 }
 
-/// What backends rely on.
+/// The invariants that backends rely on.
 pub mod backend {
     pub use crate::backend::calibrate::crossover;
     pub use crate::backend::checked::CheckedStep;
@@ -58,12 +58,12 @@ pub mod backend {
     }
 }
 
-/// The generator of random numbers that scenes and tests share.
+/// The random number generator that scenes and tests share.
 pub mod random {
     pub use crate::random::SplitMix64;
 }
 
-/// Two backends on the same scene.
+/// Compares two backends on the same scene.
 pub mod compare {
     pub use crate::compare::*;
 }
@@ -75,7 +75,7 @@ pub mod conform {
     pub mod difference {
         pub use crate::conform::difference::*;
     }
-    /// Every kernel by one pass each.
+    /// Every kernel, in one pass each.
     pub mod passes {
         pub use crate::conform::passes::*;
     }
@@ -85,12 +85,12 @@ pub mod conform {
     }
 }
 
-/// Whether what is asked for fits into memory.
+/// Checks whether a request fits into memory.
 pub mod memory {
     pub use crate::memory::*;
 }
 
-/// The known name that is nearest to one that is not known.
+/// Suggests the known name that is nearest to an unknown one.
 pub mod suggest {
     pub use crate::suggest::*;
 }

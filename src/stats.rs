@@ -23,59 +23,60 @@ use web_time::Instant;
 pub struct StepStats {
     /// Wall time of each stage.
     pub times: StageTimes,
-    /// Pairs of colliders whose boxes overlap.
+    /// Number of pairs of colliders whose boxes overlap.
     pub pairs: usize,
-    /// Pairs whose manifolds were computed; the others were reused.
+    /// Number of pairs whose manifolds were computed; the others were reused.
     pub computed: usize,
-    /// Manifolds.
+    /// Number of manifolds.
     pub manifolds: usize,
-    /// Contact points.
+    /// Number of contact points.
     pub points: usize,
-    /// Colors, the single ones of the overflow included.
+    /// Number of colors, including the single ones of the overflow.
     pub colors: usize,
-    /// Manifolds that found no color and were swept alone.
+    /// Number of manifolds without a color, which are solved alone.
     pub overflow: usize,
-    /// Bodies that sleep.
+    /// Number of sleeping bodies.
     pub asleep: usize,
-    /// Bodies that are awake and can be pushed, by the class of effort of their island: in class c an island takes 2^c times the
+    /// Number of awake dynamic bodies by the substep level of their island: at level c an island takes 2^c times the
     /// substeps of the settings.
     pub efforts: [u32; EFFORT_CLASSES],
-    /// The contact that asks for most substeps.
+    /// The contact that needs the most substeps.
     pub hardest: Option<HardestContact>,
-    /// Joints.
+    /// Number of joints.
     pub joints: usize,
-    /// Those of them that are solved at once and not swept.
+    /// Number of joints in direct joint systems, which are not swept.
     pub direct_joints: usize,
-    /// Largest gap that sweeps would leave in a joint at rest, as a share of its arms. Above `max_joint_gap_share` of the settings, nets take more
-    /// substeps.
+    /// Largest gap that sweeps would leave in a joint at rest, relative to its arms. Above `max_joint_gap_share` of the
+    /// settings, nets take more substeps.
     pub swept_joint_gap: f32,
-    /// Energy that the step took from bodies because constraints had made it (J).
+    /// Energy that the step removed from bodies because constraints had added it (J).
     pub energy_taken: f64,
-    /// Islands whose step would have made more energy than they have: they stood still, and take shorter substeps from the next step on.
+    /// Number of islands whose step would have added more energy than they have. Their bodies did not move, and they
+    /// take shorter substeps from the next step on.
     pub refused: usize,
-    /// Sweeps that were done, where the settings have a tolerance; else 0.
+    /// Number of completed sweeps if the settings have a tolerance, else 0.
     pub sweeps: u32,
-    /// Sweeps that the plan held, where the settings have a tolerance; else 0.
+    /// Number of sweeps in the plan if the settings have a tolerance, else 0.
     pub planned_sweeps: u32,
-    /// Passes of the plan: dispatches, where a device does not follow all of it in one (`traffic`).
+    /// Number of passes in the plan. They are dispatches, unless a device runs the whole plan in one (`traffic`).
     pub dispatches: usize,
     /// Bytes that the kernels of the plan read and write.
     pub bytes_moved: u64,
     /// Bytes sent to a device and read back.
     pub traffic: Traffic,
-    /// How long a device was at each kernel, where it has a clock.
+    /// Time of a device at each kernel, if it has a clock.
     pub kernels: Vec<KernelTime>,
-    /// The first body whose pose or velocity the step made not finite, if any: it touches nothing from then on, and no step is
-    /// refused for it.
+    /// The first body whose pose or velocity became not finite in the step, or `None`. The body touches nothing from
+    /// then on, and later steps do not fail because of it.
     pub first_non_finite: Option<usize>,
-    /// One line where a device was lost in this step: the reason, and the backend that repeated the step and goes on.
+    /// One line if a device was lost in this step: the reason, and the backend that repeated the step and continues.
     pub fault: Option<String>,
 }
 
-/// Number of classes of effort: 4096 substeps are the most that the settings take.
+/// Number of substep levels: the settings allow at most 4096 substeps.
 pub const EFFORT_CLASSES: usize = 13;
 
-/// The contact that asks for most substeps.
+/// The contact that needs the most substeps.
 ///
 /// ```
 /// # use drystone::{Reference, Scene, Simulation, SolverConfig};
@@ -85,7 +86,7 @@ pub const EFFORT_CLASSES: usize = 13;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
 /// # }
-/// // A tower whose top is a thousand times as heavy: the substeps of the settings would not do.
+/// // A tower with a top that is a thousand times as heavy: the substeps of the settings are not sufficient.
 /// let hardest: drystone::stats::HardestContact = stats.hardest.expect("a load");
 /// assert!(hardest.need > 1.0 && simulation.substeps_of(10) > simulation.config().substeps);
 /// # Ok::<(), drystone::Error>(())
@@ -94,14 +95,15 @@ pub const EFFORT_CLASSES: usize = 13;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct HardestContact {
-    /// Its bodies that can be pushed; one only if the other cannot.
+    /// Its dynamic bodies; only one if the other body is not dynamic.
     pub bodies: [Option<usize>; 2],
-    /// How deep it would sag with the substeps of the settings under what it bears for long, over the sag that the settings promise. An
-    /// island of need n takes at least the square root of n times these substeps.
+    /// Static compression of the contact under its sustained load with the substeps of the settings, divided by the
+    /// compression that the settings promise. An island with need n takes at least the square root of n times these
+    /// substeps.
     pub need: f32,
 }
 
-/// Time that a device spent at one kernel in one step.
+/// Time of a device at one kernel in one step.
 ///
 /// ```
 /// # use drystone::{Reference, Scene, Simulation, SolverConfig};
@@ -119,11 +121,11 @@ pub struct HardestContact {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct KernelTime {
-    /// Its name.
+    /// Name of the kernel.
     pub kernel: &'static str,
-    /// All its passes together.
+    /// Total time of all its passes.
     pub time: Duration,
-    /// Bytes that they read and write; 0 for those that are not of the plan.
+    /// Bytes that the passes read and write; 0 for kernels outside the plan.
     pub bytes: u64,
 }
 
@@ -148,15 +150,15 @@ pub struct Traffic {
     pub up: u64,
     /// Bytes read back.
     pub down: u64,
-    /// Dispatches, those included that bring rows to their places; 0 without a device.
+    /// Number of dispatches, including those that bring rows to their places; 0 without a device.
     pub dispatches: usize,
-    /// Submissions: several where one would hold the device for long.
+    /// Number of submissions: more than one if a single one would hold the device too long.
     pub submissions: usize,
-    /// Longest that one of them took, as the host saw it.
+    /// The longest time of a submission, measured by the host.
     pub longest_submission: Duration,
 }
 
-/// Wall time of each stage of a step; zero in a browser, whose WebAssembly has no clock.
+/// Wall time of each stage of a step. It is zero in a browser, because WebAssembly has no clock.
 ///
 /// ```
 /// # use drystone::{Reference, Scene, Simulation, SolverConfig};
@@ -176,11 +178,11 @@ pub struct Traffic {
 pub struct StageTimes {
     /// Finding contacts.
     pub detect: Duration,
-    /// Coloring them.
+    /// Coloring contacts.
     pub color: Duration,
     /// Writing the rows.
     pub prepare: Duration,
-    /// Sweeping, transfers included.
+    /// Sweeping, including transfers.
     pub run: Duration,
     /// Reading the rows back into the world.
     pub store: Duration,
@@ -198,19 +200,20 @@ impl StageTimes {
         ]
     }
 
-    /// All stages together.
+    /// Total time of all stages.
     pub fn total(&self) -> Duration {
         self.stages().iter().map(|s| s.1).sum()
     }
 }
 
-/// Takes the time since it was started.
+/// Measures the time since its start.
 #[derive(Clone, Copy)]
 pub(crate) struct Stopwatch {
     start: Instant,
 }
 
-/// WebAssembly has no clock of its own, and the clock of a page comes with the feature `gpu`. Without the feature no time passes.
+/// WebAssembly has no clock of its own, and the browser's clock comes with the feature `gpu`. Without the feature the
+/// time is always zero.
 #[cfg(all(target_family = "wasm", target_os = "unknown", not(feature = "gpu")))]
 #[derive(Clone, Copy)]
 struct Instant;
@@ -236,7 +239,7 @@ impl Stopwatch {
     }
 }
 
-/// Runs `f` and adds how long it took to `time`.
+/// Runs `f` and adds its duration to `time`.
 pub(crate) fn timed<T>(time: &mut Duration, f: impl FnOnce() -> T) -> T {
     let start = Stopwatch::start();
     let result = f();
@@ -244,7 +247,8 @@ pub(crate) fn timed<T>(time: &mut Duration, f: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The largest of `from` and some numbers; NaN if any of these is, so that it spoils a check instead of passing unseen.
+/// The largest of `from` and some numbers. It is NaN if any of them is NaN, so that a check fails instead of ignoring
+/// it.
 ///
 /// ```
 /// use drystone::stats::largest;
@@ -256,7 +260,7 @@ pub fn largest(from: f64, values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(from, |x, y| if y > x || y.is_nan() { y } else { x })
 }
 
-/// The middle of some numbers, the mean of the two middle ones if they are even in number; NaN for none.
+/// The median of some numbers: the mean of the two middle ones if their count is even, and NaN for an empty list.
 ///
 /// ```
 /// assert_eq!(drystone::stats::median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
@@ -265,7 +269,7 @@ pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// The number that a share `q` of some numbers does not exceed, linear between neighbors; NaN for none.
+/// The quantile `q` of some numbers, linear between neighbors; NaN for an empty list.
 ///
 /// ```
 /// assert_eq!(drystone::stats::quantile(&[1.0, 2.0, 3.0], 0.75), 2.5);

@@ -1,12 +1,13 @@
-//! The known name that is nearest to one that is not known.
+//! Suggests the known name that is nearest to an unknown one.
 
 use std::fmt::Display;
 
-/// The name that differs from what was typed by one slip in three letters at most; else the only one that contains it.
+/// The name that differs from the typed word by at most one slip in three letters; else the only name that contains the
+/// word.
 pub fn nearest<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let typed = typed.trim().to_lowercase();
     let letters = typed.chars().count();
-    // Of one letter every other one is as near.
+    // For a single letter, all other letters would be equally near.
     if letters < 2 {
         return None;
     }
@@ -27,7 +28,7 @@ pub fn nearest<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>) -> Opt
     }
 }
 
-/// `; did you mean "pile"? more` or `; more`, to end a message with.
+/// The end of a message: `; did you mean "pile"? more` or `; more`.
 pub fn hint<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>, more: impl Display) -> String {
     match nearest(typed, names) {
         Some(name) => format!("; did you mean {name:?}? {more}"),
@@ -35,11 +36,11 @@ pub fn hint<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>, more: imp
     }
 }
 
-/// Names that a message may list in full.
+/// Largest number of names that a message lists in full.
 const FEW: usize = 9;
 
-/// A message of serde's about an unknown name, which lists all known ones: the nearest instead of a long list, and `all`, which
-/// says where the list is.
+/// Shortens a message of serde about an unknown name. It replaces the long list of all known names by the nearest one
+/// and `all`, which says where the list is.
 pub fn shorten(message: &str, all: &str) -> String {
     let Some((head, tail)) = message.split_once(", expected one of ") else { return message.to_owned() };
     let Some((list, place)) = tail.rsplit_once('`') else { return message.to_owned() };

@@ -1,16 +1,16 @@
-//! The adapter that runs are made on.
+//! The adapter for runs.
 
 /// The best adapter of this machine.
 pub struct Adapter {
     /// Its name, API and driver.
     pub name: String,
-    /// Whether it is a GPU, and not software.
+    /// Whether it is a hardware GPU.
     pub hardware: bool,
-    /// Whether exact mode runs on it by SPIR-V.
+    /// Whether exact mode uses SPIR-V on it.
     pub takes_spirv: bool,
 }
 
-/// The best adapter; none where there is none, or in a build without the feature `gpu`.
+/// The best adapter, or `None` if there is none or this build lacks the feature `gpu`.
 pub fn best() -> Option<Adapter> {
     #[cfg(feature = "gpu")]
     return drystone::backend::gpu::adapters().into_iter().next().map(|found| Adapter {

@@ -1,4 +1,4 @@
-//! Files that appear under their names only when they are complete, and what is said of them when the command ends early.
+//! Files that appear under their names only when they are complete, and messages about them when a command ends early.
 
 use std::fs::File;
 use std::io::{ErrorKind, Write};
@@ -7,13 +7,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use drystone::{Error, Result};
 
-/// What the command has done to files so far.
+/// The state of the command's files.
 struct Book {
     /// Drafts that are open.
     drafts: Vec<Entry>,
-    /// Files that are complete, and rows that stay.
+    /// Complete files, and rows that remain.
     kept: Vec<PathBuf>,
-    /// Rows from which the same command goes on.
+    /// Rows from which the same command can continue.
     resumed: Vec<PathBuf>,
     /// Files whose drafts were discarded.
     discarded: Vec<PathBuf>,
@@ -27,18 +27,18 @@ struct Entry {
 static BOOK: Mutex<Book> =
     Mutex::new(Book { drafts: Vec::new(), kept: Vec::new(), resumed: Vec::new(), discarded: Vec::new() });
 
-/// A file or folder under a hidden name beside the final one. `keep` renames it; a draft that is dropped is removed.
+/// A file or folder under a hidden name beside the final one. `keep` renames it. A draft that is dropped is removed.
 pub struct Draft {
     /// The path that the caller gave, for messages.
     path: PathBuf,
     /// The final path, with links resolved.
     target: PathBuf,
-    /// The hidden path; none if the target is a device or a pipe, which is written directly.
+    /// The hidden path, or `None` if the target is a device or a pipe, which is written directly.
     hidden: Option<PathBuf>,
 }
 
 impl Draft {
-    /// Chooses the hidden path and creates nothing.
+    /// Chooses the hidden path. Creates nothing.
     pub fn of(path: &Path) -> Result<Self> {
         let there = std::fs::metadata(path);
         if there.as_ref().is_ok_and(|m| !m.is_file() && !m.is_dir()) {
@@ -64,14 +64,14 @@ impl Draft {
     }
 
     pub fn create(&self) -> Result<File> {
-        // A command that is being stopped creates no file behind the back of `stop`.
+        // While `stop` runs, no file may be created.
         let _book = book();
         let made = if self.target.is_dir() { Err(ErrorKind::IsADirectory.into()) } else { File::create(self.place()) };
         made.map_err(Error::file(&self.path))
     }
 
-    /// Renames the draft; an existing file of that name is replaced. Some file systems report a full disk not before the contents are
-    /// synchronized.
+    /// Renames the draft. It replaces an existing file of that name. Some file systems report a full disk only when the
+    /// contents are synchronized.
     pub fn keep(mut self) -> Result<()> {
         let Some(hidden) = &self.hidden else { return Ok(()) };
         if hidden.is_file() {
@@ -99,21 +99,21 @@ impl Drop for Draft {
     }
 }
 
-/// Notes a file that is whole at any time, because rows are added to it one by one.
+/// Records a file that grows row by row and is complete at any time.
 pub fn note_rows(path: &Path) {
     note(&mut book().kept, path);
 }
 
-/// Notes that the same command goes on from the rows of a file.
+/// Records that the same command can continue from the rows of a file.
 pub fn note_resumed(path: &Path) {
     note(&mut book().resumed, path);
 }
 
-/// Ends the process with a line that says what is left: no draft, and no file created from now on.
+/// Ends the process with a line about the outputs. No draft remains, and no file is created from now on.
 pub fn stop(say: impl FnOnce(&str), code: i32) -> ! {
     let mut book = book();
     for Entry { hidden, path } in std::mem::take(&mut book.drafts) {
-        // Another thread may still add files to a folder.
+        // Another thread can still add files to a folder.
         (0..100).take_while(|_| hidden.exists()).for_each(|_| discard(&hidden));
         note(&mut book.discarded, &path);
     }
@@ -121,7 +121,7 @@ pub fn stop(say: impl FnOnce(&str), code: i32) -> ! {
     std::process::exit(code)
 }
 
-/// What is left of all outputs: `; kept a.csv; b.csv is as it was; c.csv was not written`, or nothing without outputs.
+/// The remaining outputs: `; kept a.csv; b.csv is as before; c.csv was not written`, or nothing without outputs.
 pub fn left() -> String {
     left_of(&book())
 }
@@ -136,7 +136,7 @@ fn left_of(book: &Book) -> String {
     let was = |paths: &[&PathBuf]| if paths.len() == 1 { "was" } else { "were" };
     let parts = [
         (!kept.is_empty()).then(|| format!("kept {}", list(&kept))),
-        (!resumed.is_empty()).then(|| format!("the same command goes on from {}", list(&resumed))),
+        (!resumed.is_empty()).then(|| format!("the same command continues from {}", list(&resumed))),
         (!old.is_empty()).then(|| format!("{} {} as before", list(&old), is(&old))),
         (!none.is_empty()).then(|| format!("{} {} not written", list(&none), was(&none))),
     ];
@@ -175,7 +175,7 @@ fn discard(draft: &Path) {
     let _ = if draft.is_dir() { std::fs::remove_dir_all(draft) } else { std::fs::remove_file(draft) };
 }
 
-/// Writes a file at once: a reader finds the old contents or all of the new.
+/// Writes a file atomically: a reader finds either the old contents or all of the new contents.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let draft = Draft::of(path)?;
     draft.create()?.write_all(bytes).map_err(Error::file(path))?;

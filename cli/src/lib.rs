@@ -1,4 +1,4 @@
-//! The laboratory around drystone: the command line, reports, benchmarks, hard cases, pictures and the window of a game.
+//! The tools around drystone: the command line, reports, benchmarks, hard cases, pictures and the window of a game.
 
 #![deny(unsafe_code)]
 

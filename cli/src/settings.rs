@@ -25,7 +25,7 @@ pub fn awake<'a>(assignments: impl IntoIterator<Item = &'a str>) -> Result<Solve
     Ok(config)
 }
 
-/// The settings that differ from their defaults, as `key=value`, without those named in `said`.
+/// The settings that differ from their defaults, as `key=value`, without those in `said`.
 pub fn unusual(config: &SolverConfig, said: &[&str]) -> Vec<String> {
     let usual = list(&SolverConfig::default());
     let differs = |(key, value): &(String, Value)| {
@@ -33,7 +33,7 @@ pub fn unusual(config: &SolverConfig, said: &[&str]) -> Vec<String> {
     };
     let text = |(key, value): (String, Value)| match value {
         Value::String(word) => format!("{key}={word}"),
-        // The shortest text of the f32; the f64 has digits of its rounding.
+        // The shortest text of the f32; the f64 would show digits of rounding.
         Value::Float(x) => format!("{key}={}", x as f32),
         value => format!("{key}={value}"),
     };
@@ -53,7 +53,7 @@ fn table(config: &SolverConfig) -> Table {
     Table::try_from(config).expect("a config is a table")
 }
 
-/// Changes one setting by `key=value` in TOML; a bare word needs no quotes.
+/// Changes one setting by `key=value` in TOML. A bare word needs no quotes.
 pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
     let (key, value) =
         assignment.split_once('=').ok_or_else(|| Error::input(format!("--set {assignment}: write it as key=value")))?;
@@ -66,7 +66,7 @@ pub fn set(config: &mut SolverConfig, assignment: &str) -> Result<()> {
         Some((Some(Value::Table(group)), name)) => (group, name),
         _ => (&mut all, key),
     };
-    // A real setting accepts a whole number.
+    // A setting with a real value accepts a whole number.
     if let (Some(Value::Float(_)), Value::Integer(i)) = (place.get(name), &parsed) {
         parsed = Value::Float(*i as f64);
     }
@@ -83,10 +83,10 @@ fn first_line(e: &toml::de::Error) -> String {
     let message = e.message().lines().collect::<Vec<_>>().join(" ");
     let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split_once('`')).map(|(name, _)| name);
     if let Some(name) = unknown.filter(|name| table(&SolverConfig::default())["rules"].get(name).is_some()) {
-        return format!("{name}: is a rule for comparison now; set rules.{name}");
+        return format!("{name}: this setting is now a comparison rule; set rules.{name}");
     }
     if message.starts_with("unknown variant `slip`") {
-        return "slip: is a rule for comparison now; set rules.slip_friction=true".into();
+        return "slip: this setting is now a comparison rule; set rules.slip_friction=true".into();
     }
     shorten(&message, "`drystone settings` lists all")
 }

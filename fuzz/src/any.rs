@@ -1,4 +1,4 @@
-//! Numbers, shapes, bodies and joints of any kind, good and bad, from bytes.
+//! Numbers, shapes, bodies and joints from bytes, both valid and invalid.
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use drystone::glam::{Quat, Vec3};
@@ -6,7 +6,7 @@ use drystone::{Axis, Body, BodyHandle, BodyKind, Groups, Joint, MassProperties, 
 
 use crate::good;
 
-/// Mostly of ordinary size, now and then one that breaks something.
+/// Usually an ordinary size, sometimes a value that causes errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Number(pub f32);
 
@@ -41,7 +41,7 @@ impl<'a> Arbitrary<'a> for Number {
     }
 }
 
-/// Mostly from 0.01 to 1.3 m.
+/// Usually from 0.01 to 1.3 m.
 #[derive(Clone, Copy, Debug)]
 pub struct Size(pub f32);
 
@@ -63,7 +63,7 @@ impl Vector {
     }
 }
 
-/// Mostly of unit length.
+/// Usually of unit length.
 #[derive(Arbitrary, Clone, Copy, Debug)]
 pub struct Turn {
     q: [i8; 4],
@@ -103,7 +103,7 @@ impl AnyShape {
             points.iter().take(24).map(|p| Vec3::from_array(p.map(|x| f32::from(x) / 64.0 * size.0))).collect()
         };
         let corners = |points: usize, triangles: &[[u8; 3]]| -> Vec<[u32; 3]> {
-            // Mostly vertices that are there.
+            // Usually vertices that exist.
             let corner = |k: u8| if k == 255 { 255 } else { u32::from(k) % points.max(1) as u32 };
             triangles.iter().take(24).map(|t| t.map(corner)).collect()
         };
@@ -276,7 +276,7 @@ enum AnyJointKind {
 }
 
 impl AnyJoint {
-    /// Between two bodies; none for the world.
+    /// A joint between two bodies, or to the world if `b` is `None`.
     pub fn joint(&self, a: BodyHandle, b: Option<BodyHandle>) -> Joint {
         let [anchor_a, anchor_b] = self.anchors.map(Vector::vec);
         let joint = match b {

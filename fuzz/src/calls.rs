@@ -9,7 +9,7 @@ use crate::any::{AnyBody, AnyJoint, AnyMass, AnyShape, Kind, Number, Turn, Vecto
 use crate::run::Runs;
 use crate::{good, is_one_line, show};
 
-/// The most of bodies and calls: more find nothing new.
+/// Largest numbers of bodies and calls: more of them find nothing new.
 const MOST_BODIES: usize = 16;
 const MOST_CALLS: usize = 32;
 
@@ -59,7 +59,7 @@ enum Call {
     Look,
 }
 
-/// Settings of few substeps, or an input would take seconds.
+/// Settings with few substeps; otherwise an input would take seconds.
 fn set(config: &SolverConfig, setting: &Setting) -> Option<SolverConfig> {
     let all = serde_json::to_value(config).expect("settings serialize");
     let mut keys: Vec<String> =
@@ -107,9 +107,9 @@ struct Game {
     runs: Runs,
     bodies: Vec<BodyHandle>,
     joints: Vec<JointHandle>,
-    /// The world after the last step that was not refused.
+    /// The world after the last accepted step.
     good: World,
-    /// The bodies and joints that had a handle then.
+    /// The numbers of bodies and joints that had a handle then.
     named: [usize; 2],
 }
 
@@ -118,7 +118,7 @@ impl Game {
         (!self.bodies.is_empty()).then(|| self.bodies[usize::from(k) % self.bodies.len()])
     }
 
-    /// A step. What a step refuses is undone, so that the run goes on.
+    /// Makes a step. If the step is refused, its changes are undone, so that the run continues.
     fn step(&mut self, dt: f32) {
         if self.runs.step(dt) {
             self.good.clone_from(&self.runs.first().world);
@@ -126,13 +126,13 @@ impl Game {
         } else {
             let good = &self.good;
             self.runs.each(|simulation| simulation.world.clone_from(good));
-            // Handles since then name nothing, and may come again.
+            // Newer handles name nothing, and can occur again.
             self.bodies.truncate(self.named[0]);
             self.joints.truncate(self.named[1]);
         }
     }
 
-    /// Changes a body of each simulation; a handle of a body that is gone names none.
+    /// Changes a body of each simulation. The handle of a removed body names no body.
     fn change(&mut self, k: u8, mut change: impl FnMut(&mut drystone::Body)) {
         let Some(handle) = self.body(k) else { return };
         self.runs.each(|simulation| {
@@ -256,7 +256,7 @@ impl Game {
         }
     }
 
-    /// Reads all that can be read.
+    /// Reads everything readable.
     fn look(&mut self) {
         let simulation = self.runs.first();
         for contact in simulation.contacts() {
@@ -311,7 +311,7 @@ fn play(program: &Program) {
     game.step(1.0 / 60.0);
 }
 
-/// Random bytes are as good as any.
+/// Random bytes are good seeds.
 pub fn seeds() -> Vec<Vec<u8>> {
     let bytes = |seed: u32| {
         let mut state = seed;

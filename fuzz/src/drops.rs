@@ -1,4 +1,4 @@
-//! Good worlds: what falls comes to rest on what is below, and nothing gains energy.
+//! Valid worlds: falling bodies come to rest on the bodies below, and no energy is gained.
 
 use arbitrary::{Arbitrary, Unstructured};
 use drystone::glam::{Quat, Vec3};
@@ -7,7 +7,7 @@ use drystone::{Body, Shape, SolverConfig, World};
 use crate::run::Runs;
 use crate::show;
 
-/// Sizes (m) and speeds (m/s) between which an engineer would choose.
+/// Sizes (m) and speeds (m/s) that an engineer would choose.
 #[derive(Arbitrary, Debug)]
 struct Drop {
     floor: Floor,
@@ -39,7 +39,7 @@ struct Thing {
 
 const FLOOR: f32 = 12.0;
 const MOST_THINGS: usize = 8;
-/// The thickness of floors that have one (m): no thing gets farther in a step.
+/// The thickness of floors (m). No body moves further in a step.
 const THICKNESS: f32 = 1.0;
 
 impl Floor {
@@ -61,7 +61,7 @@ impl Floor {
 }
 
 impl Thing {
-    /// Above all that is below, so that nothing overlaps.
+    /// Placed above all bodies so far, so that nothing overlaps.
     fn body(&self, lowest: &mut f32) -> Body {
         let [a, b, c] = self.size.map(|size| 0.1 + f32::from(size) / 400.0);
         let shape = match self.shape % 5 {
@@ -99,11 +99,11 @@ pub fn check(data: &[u8]) {
     fall(&mut runs, 30 + u32::from(drop.steps), |_, _| ());
 }
 
-/// Makes the steps, with something between them.
+/// Makes the steps, with a call of `between` between them.
 fn fall(runs: &mut Runs, steps: u32, mut between: impl FnMut(u32, &mut Runs)) {
     let whole = |world: &World| world.kinetic_energy() + world.potential_energy();
     let begin = whole(&runs.first().world);
-    // What the solver may add: the work of weight over a centimeter.
+    // The solver can add this much: the work of the weight over a centimeter.
     let mass: f64 = runs.first().world.dynamic().map(|body| f64::from(body.mass.mass)).sum();
     let most = begin + 1e-3 * begin.abs() + 0.1 * mass;
     for step in 0..steps {
@@ -128,7 +128,7 @@ pub fn seeds() -> Vec<Vec<u8>> {
 mod tests {
     use super::*;
 
-    /// A ball that falls, and what happens to it after ten steps.
+    /// A falling ball, and a change to it after ten steps.
     fn fall_and(after: impl Fn(&mut Runs)) {
         let mut world = World::new();
         world.insert(Floor::HalfSpace.body());

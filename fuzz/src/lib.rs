@@ -1,7 +1,7 @@
-//! What drystone must bear: for each kind of input a function over bytes that panics where a promise is broken.
+//! Fuzz tests of drystone: for each kind of input, a function over bytes that panics if the library breaks a promise.
 //!
-//! The promises: no panic, no hang, an error is one line, nothing that is no number stays unreported, every backend and number of threads gives
-//! the same bits, what is written is read back the same, nothing gains energy, nothing goes through a floor.
+//! The promises: no panic, no hang, each error is one line, every NaN is reported, every backend and number of threads
+//! gives the same bits, written data is read back unchanged, no energy is gained, and nothing passes through a floor.
 
 #![deny(unsafe_code)]
 
@@ -18,17 +18,17 @@ use drystone::Error;
 
 /// A kind of input.
 pub struct Target {
-    /// Its name, which is also that of its folders.
+    /// Its name, which its folders share.
     pub name: &'static str,
-    /// Panics where the input breaks a promise.
+    /// Panics if the input breaks a promise.
     pub check: fn(&[u8]),
-    /// Good inputs to begin with.
+    /// Valid inputs to begin with.
     pub seeds: fn() -> Vec<Vec<u8>>,
-    /// The most bytes of an input that finds something new.
+    /// The largest number of bytes in a useful input.
     pub longest: usize,
 }
 
-/// All kinds.
+/// All kinds of input.
 pub const TARGETS: &[Target] = &[
     Target { name: "scene", check: texts::scene, seeds: texts::scenes, longest: 4096 },
     Target { name: "spec", check: texts::spec, seeds: texts::specs, longest: 128 },
@@ -45,12 +45,12 @@ pub const TARGETS: &[Target] = &[
     Target { name: "drops", check: drops::check, seeds: drops::seeds, longest: 256 },
 ];
 
-/// The kind of this name.
+/// The kind with this name.
 pub fn target(name: &str) -> Option<&'static Target> {
     TARGETS.iter().find(|target| target.name == name)
 }
 
-/// Prints what an input stands for, with `DRYSTONE_FUZZ_SHOW`.
+/// Prints the meaning of an input if `DRYSTONE_FUZZ_SHOW` is set.
 fn show(input: &impl std::fmt::Debug) {
     static ASKED: LazyLock<bool> = LazyLock::new(|| std::env::var_os("DRYSTONE_FUZZ_SHOW").is_some());
     if *ASKED {
@@ -58,7 +58,7 @@ fn show(input: &impl std::fmt::Debug) {
     }
 }
 
-/// An error that a user can read: one line that says something.
+/// Checks that an error is readable for a user: one line with a message.
 fn is_one_line(error: &Error) {
     let line = error.to_string();
     assert!(!line.trim().is_empty(), "an error without a word: {error:?}");
@@ -66,7 +66,7 @@ fn is_one_line(error: &Error) {
     assert!(line.len() < 4000, "an error of {} bytes: {}...", line.len(), line.chars().take(200).collect::<String>());
 }
 
-/// The value, or none after a look at the error, which must not be a mistake of the library.
+/// The value, or `None` after a check of the error, which must not be a defect of the library.
 fn good<T>(result: drystone::Result<T>) -> Option<T> {
     if let Err(error) = &result {
         assert!(!matches!(error, Error::Panicked(_)), "{error}");
@@ -74,7 +74,7 @@ fn good<T>(result: drystone::Result<T>) -> Option<T> {
     borne(result)
 }
 
-/// The same, of what someone forged.
+/// The same for forged input.
 fn borne<T>(result: drystone::Result<T>) -> Option<T> {
     result.map_err(|error| is_one_line(&error)).ok()
 }

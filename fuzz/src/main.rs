@@ -1,5 +1,5 @@
-//! libFuzzer over the kind of input that `DRYSTONE_FUZZ` names. With `DRYSTONE_FUZZ_SEEDS`, a folder, it writes good inputs there instead; without
-//! a kind it names all kinds, each with its longest input.
+//! Runs libFuzzer on the kind of input that `DRYSTONE_FUZZ` names. If `DRYSTONE_FUZZ_SEEDS` names a folder, it writes
+//! valid inputs there instead. Without a kind it prints all kinds, each with its longest input.
 #![no_main]
 
 use std::panic::catch_unwind;
@@ -16,7 +16,7 @@ fn chosen() -> &'static Target {
             std::process::exit(0)
         };
         target(&name).unwrap_or_else(|| {
-            eprintln!("DRYSTONE_FUZZ={name}: is no kind of input");
+            eprintln!("DRYSTONE_FUZZ={name}: unknown kind of input");
             std::process::exit(2)
         })
     })
@@ -30,7 +30,7 @@ fn write_seeds(folder: &Path) -> std::io::Result<()> {
 
 libfuzzer_sys::fuzz_target!(
     init: {
-        // A panic that the library makes an error of is none here: libfuzzer-sys would abort in its hook.
+        // The library turns some panics into errors. They must not abort here, as the hook of libfuzzer-sys would.
         std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
         chosen();
         if let Some(folder) = std::env::var_os("DRYSTONE_FUZZ_SEEDS") {

@@ -1,4 +1,4 @@
-//! The same simulation on several backends and numbers of threads, in step.
+//! Runs the same simulation on several backends and numbers of threads, in lockstep.
 
 use std::sync::OnceLock;
 
@@ -17,7 +17,7 @@ fn one_thread() -> &'static ThreadPool {
     POOL.get_or_init(|| ThreadPoolBuilder::new().num_threads(1).build().expect("a pool"))
 }
 
-/// What runs a simulation.
+/// A backend with its number of threads.
 struct Way {
     name: &'static str,
     pool: fn() -> &'static ThreadPool,
@@ -30,13 +30,13 @@ const WAYS: [Way; 3] = [
     Way { name: "three threads", pool: three_threads, backend: || Box::new(Cpu::new()) },
 ];
 
-/// A simulation in three ways.
+/// A simulation in three variants.
 pub struct Runs {
     simulations: Vec<Simulation>,
 }
 
 impl Runs {
-    /// None if the world or the settings are refused, by all with one line.
+    /// Returns `None` if the world or the settings are refused. All variants must refuse them with the same line.
     pub fn new(world: &World, config: &SolverConfig) -> Option<Self> {
         let begun =
             |way: &Way| (way.pool)().install(|| Simulation::new(world.clone(), config.clone(), (way.backend)()));
@@ -44,22 +44,22 @@ impl Runs {
         Some(Self { simulations })
     }
 
-    /// The one that others are compared with.
+    /// The variant that the others are compared with.
     pub fn first(&mut self) -> &mut Simulation {
         &mut self.simulations[0]
     }
 
-    /// The same call on each.
+    /// Makes the same call on each variant.
     pub fn each(&mut self, mut call: impl FnMut(&mut Simulation)) {
         self.simulations.iter_mut().for_each(&mut call);
     }
 
-    /// The same call on each, which all refuse or none.
+    /// Makes the same call on each variant. Either all refuse it or none.
     pub fn all(&mut self, mut call: impl FnMut(&mut Simulation) -> Result<()>) -> bool {
         agreed(self.simulations.iter_mut().map(&mut call).collect()).is_some()
     }
 
-    /// Saves and loads each but the first.
+    /// Saves and loads each variant except the first.
     pub fn reload(&mut self) {
         for (simulation, way) in self.simulations.iter_mut().zip(&WAYS).skip(1) {
             let saved = simulation.save();
@@ -67,19 +67,20 @@ impl Runs {
         }
     }
 
-    /// A step of each, which all refuse or none; what is no number is reported, and all have the same bits.
+    /// Makes a step of each variant. Either all refuse it or none. Every NaN must be reported, and all variants must
+    /// have the same bits.
     pub fn step(&mut self, dt: f32) -> bool {
         let step = |(simulation, way): (&mut Simulation, &Way)| (way.pool)().install(|| simulation.step(dt));
         let before = self.simulations[0].hash();
         let stats = self.simulations.iter_mut().zip(&WAYS).map(step).collect();
         let Some(stats) = agreed(stats) else {
-            assert_eq!(self.simulations[0].hash(), before, "a step that was refused moved something");
+            assert_eq!(self.simulations[0].hash(), before, "a refused step moved something");
             return false;
         };
         let first = &self.simulations[0];
         for ((simulation, way), stats) in self.simulations.iter().zip(&WAYS).zip(&stats) {
             let unreported = simulation.world.first_non_finite();
-            assert_eq!(stats.first_non_finite, unreported, "{}: the first body with a number that is none", way.name);
+            assert_eq!(stats.first_non_finite, unreported, "{}: the first body with a NaN", way.name);
             let differs =
                 first.world.bodies.iter().zip(&*simulation.world.bodies).position(|(a, b)| bits(a) != bits(b));
             assert_eq!(differs, None, "{}: the first body whose bits are others", way.name);
@@ -89,7 +90,7 @@ impl Runs {
     }
 }
 
-/// The motion of a body. What is no number has many bits, which no rule of arithmetic fixes.
+/// The motion of a body. All NaN count as equal: no rule of arithmetic fixes their bits.
 fn bits(body: &Body) -> [u32; 13] {
     let Body { position: p, rotation: q, linear_velocity: v, angular_velocity: w, .. } = body;
     let numbers = [p.x, p.y, p.z, q.x, q.y, q.z, q.w, v.x, v.y, v.z, w.x, w.y, w.z];
@@ -100,7 +101,7 @@ fn debug(event: &drystone::Event) -> String {
     format!("{event:?}")
 }
 
-/// The values where all are good; none where all are refused with the same line.
+/// The values if all results are good, or `None` if all are refused with the same line.
 fn agreed<T>(results: Vec<Result<T>>) -> Option<Vec<T>> {
     let lines: Vec<Option<String>> = results.iter().map(|r| r.as_ref().err().map(ToString::to_string)).collect();
     assert!(lines.windows(2).all(|pair| pair[0] == pair[1]), "refused in one way and not in another: {lines:?}");

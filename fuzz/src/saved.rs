@@ -1,4 +1,4 @@
-//! Saved states and recordings, damaged behind the hash that finds damage.
+//! Saved states and recordings with damage that their hash does not reveal.
 
 use drystone::{Cpu, Recorder, RecordingIntervals, Replay, Scene, Simulation, SolverConfig};
 
@@ -7,7 +7,7 @@ use crate::borne;
 /// Bytes before the content of a saved run: magic, version, hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 
-/// The hash of a saved run or of a part of a recording.
+/// The hash of a saved run, or of a part of a recording.
 fn hash_of(content: &[u8]) -> [u8; 8] {
     let (words, rest) = content.as_chunks::<8>();
     let mut last = [0; 8];
@@ -17,14 +17,14 @@ fn hash_of(content: &[u8]) -> [u8; 8] {
     words.fold(content.len() as u64, mix).to_le_bytes()
 }
 
-/// Makes the hash of the header fit the content, as someone would who means harm.
+/// Recomputes the hash of the header, as an attacker would.
 fn fit(bytes: &mut [u8]) {
     if let Some((header, content)) = bytes.split_first_chunk_mut::<HEADER>() {
         header[12..].copy_from_slice(&hash_of(content));
     }
 }
 
-/// The same for each part of a recording, which follow magic and version: kind, length, hash, content.
+/// The same for each part of a recording. Parts follow magic and version: kind, length, hash, content.
 fn fit_parts(bytes: &mut [u8]) {
     let Some((_, mut rest)) = bytes.split_at_mut_checked(8 + 4) else { return };
     while let Some((header, after)) = rest.split_first_chunk_mut::<17>() {
@@ -39,7 +39,7 @@ fn fit_parts(bytes: &mut [u8]) {
     }
 }
 
-/// A saved run whose hash is made to fit.
+/// A saved run with a recomputed hash.
 pub fn state(data: &[u8]) {
     let mut bytes = data.to_vec();
     fit(&mut bytes);

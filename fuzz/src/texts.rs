@@ -1,4 +1,4 @@
-//! Files that a user writes, and the words of a command line.
+//! Files that a user writes, and command-line words.
 
 use std::io::Write;
 use std::path::Path;
@@ -16,10 +16,10 @@ use drystone_maze::{Map, Script};
 
 use crate::good;
 
-/// Bodies of a scene that is also stepped.
+/// Largest number of bodies for a scene that is also stepped.
 const MOST_BODIES: usize = 200;
 
-/// Reads a file with these bytes, whose name ends as said.
+/// Reads a file with these bytes and with a name that ends in `end`.
 fn from_file<T>(bytes: &[u8], end: &str, read: impl FnOnce(&Path) -> T) -> T {
     let mut file = tempfile::Builder::new().suffix(end).tempfile().expect("a file");
     file.write_all(bytes).expect("room for a file");
@@ -30,7 +30,7 @@ pub fn scene(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Some(scene) = good(SceneFile::parse(text)).and_then(|file| good(file.into_scene("fuzzed"))) else { return };
     let bodies = scene.world.bodies.len();
-    // A file may leave out what it would be given; what is written has all.
+    // An input file can omit defaults; a written file has all values.
     if let Some(file) = good(SceneFile::of(&scene)) {
         let written = file.to_text();
         let again = SceneFile::parse(&written).and_then(|file| file.into_scene("fuzzed")).expect("what was written");
@@ -55,10 +55,10 @@ pub fn scenes() -> Vec<Vec<u8>> {
     catalogue.filter(|text| text.len() < 4096).chain([example]).collect()
 }
 
-/// A scene of the command line. Those that would be large are only looked up where they are refused.
+/// A scene of the command line. A large scene is only looked up, if the lookup refuses it.
 pub fn spec(data: &[u8]) {
     let Ok(spec) = std::str::from_utf8(data) else { return };
-    // Two digits are many enough.
+    // Two digits are enough.
     let digits = |c: char| c.is_ascii_digit();
     let is_large = spec.split(|c: char| !digits(c)).any(|number| number.len() > 2)
         || spec.contains(['e', 'E']) && spec.contains(digits);
@@ -75,7 +75,7 @@ pub fn specs() -> Vec<Vec<u8>> {
     words.chain([b"tower:n=3,worlds=4,vary=n".to_vec()]).collect()
 }
 
-/// A problem that is well-formed is solved without trouble that nobody hears of.
+/// Solves a valid problem. Every failure must be reported.
 fn solve(problem: &ContactProblem) {
     if problem.bodies.len() > 40 || problem.contacts.len() > 40 {
         return;
@@ -165,7 +165,7 @@ pub fn scripts() -> Vec<Vec<u8>> {
     vec![b"0 0 0\n1 2 -4\n# rest\n3 8 0\n".to_vec(), b"0.5 1e-3 -8\n".to_vec()]
 }
 
-/// Rows of a report that stopped, and the page that is drawn of them.
+/// Rows of an interrupted report, and the page that is drawn from them.
 pub fn rows(data: &[u8]) {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("scenes.csv"), data).expect("room for a file");

@@ -1,7 +1,7 @@
-//! A map as a world: the board is one kinematic triangle mesh.
+//! Converts a map to a world: the board is one kinematic triangle mesh.
 //!
-//! On a board of boxes side by side, a ball that overlaps the floor slightly hits the side of the next box. In a mesh, triangles know
-//! their neighbors, and only the triangle below the ball has a contact, with its own normal.
+//! On a board of separate boxes, a ball that overlaps the floor slightly would hit the side of the next box. In a mesh,
+//! triangles know their neighbors, and only the triangle below the ball has a contact, with its own normal.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use glam::{Quat, Vec2, Vec3};
 use crate::map::{Cell, Map};
 use drystone::{Body, Result, Scene, Shape, World};
 
-// Side of a cell, radii of ball and hole, height of the walls and depth of the holes (m).
+// Side of a cell, radii of ball and hole, height of the walls, and depth of the holes (m).
 pub const CELL: f32 = 0.06;
 pub const RADIUS: f32 = 0.015;
 const HOLE: f32 = 0.4 * CELL;
@@ -26,12 +26,13 @@ pub const BOARD: usize = 0;
 pub const GOAL: usize = 1;
 pub const BALL: usize = 3;
 
-/// The world of a map: kinematic board, goal and lids of the walls around the origin, and the ball at rest on the start. Rows lie
-/// along z, columns along x; the floor is at y = 0.
+/// The world of a map: kinematic board, goal and lids of the walls around the origin, and the ball at rest on the
+/// start. Rows lie along z and columns along x. The floor is at y = 0.
 pub fn scene(map: &Map) -> Result<Scene> {
     let mut world = World::new();
     world.add(Body::kinematic().named("board").shape(surface(map)?));
-    // The goal is a separate body, so that it has another color. Boundary edges have the normal of their surface, so the ball rolls on.
+    // The goal is a separate body, so that it has another color. Boundary edges have the normal of their surface, so
+    // the ball rolls across them.
     let mut plate = Surface::default();
     plate.quad(corners(map, map.goal.0 as isize, map.goal.1 as isize), Vec3::Y);
     world.add(Body::kinematic().named("goal").shape(Shape::mesh(plate.vertices, plate.triangles)?));
@@ -64,9 +65,9 @@ fn corners(map: &Map, row: isize, column: isize) -> [Vec3; 4] {
 /// Distances of the ball from floor and walls (m); an overlap is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gap {
-    /// None over a hole.
+    /// `None` over a hole.
     pub floor: Option<f32>,
-    /// Distance from the nearest wall in the cells around; infinite without one.
+    /// Distance from the nearest wall in the surrounding cells; infinite without a wall.
     pub wall: f32,
 }
 
@@ -121,7 +122,7 @@ struct Surface {
 
 impl Surface {
     fn vertex(&mut self, p: Vec3) -> u32 {
-        // Vertices within a micrometer are the same.
+        // Vertices within a micrometer count as equal.
         let key = (p * 1e6).round().as_ivec3().to_array();
         *self.known.entry(key).or_insert_with(|| {
             self.vertices.push(p);
@@ -129,7 +130,7 @@ impl Surface {
         })
     }
 
-    /// Adds a triangle that faces the side of `normal`.
+    /// Adds a triangle that faces in the direction of `normal`.
     fn triangle(&mut self, [a, b, c]: [Vec3; 3], normal: Vec3) {
         let faces = (b - a).cross(c - a).dot(normal) > 0.0;
         let corners = if faces { [a, b, c] } else { [a, c, b] };
@@ -163,7 +164,7 @@ fn surface(map: &Map) -> Result<Shape> {
             Cell::Wall => surface.quad(corners.map(|p| p + HEIGHT * Vec3::Y), Vec3::Y),
             Cell::Hole => hole(&mut surface, corners),
         }
-        // The neighbors, in the order of the edges of the cell.
+        // The neighbors, in the order of the cell's edges.
         let neighbors = [(-1, 0), (0, 1), (1, 0), (0, -1)];
         for (k, (down, right)) in neighbors.into_iter().enumerate() {
             let (a, b) = (corners[k], corners[(k + 1) % 4]);
@@ -210,7 +211,7 @@ mod tests {
             let (vertices, triangles) = surface(&map).expect("a surface").triangles();
             let area = |t: &[u32; 3]| {
                 let [a, b, c] = t.map(|i| vertices[i as usize]);
-                // The area seen from above: vertical sides have none.
+                // Area of the projection from above: vertical sides have none.
                 0.5 * (b - a).cross(c - a).y
             };
             assert!(triangles.iter().all(|t| area(t) > -1e-9), "nothing looks down");

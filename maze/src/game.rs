@@ -10,13 +10,14 @@ use drystone::{Backend, Result, Scene, Simulation, SolverConfig, World};
 
 /// Rate of the tilt (degrees/s).
 const TILT_RATE: f32 = 60.0;
-/// Steps of contact with the floor alone after which the ball rolls: a tenth of a second.
+/// Number of steps with contact only to the floor after which the ball counts as rolling: a tenth of a second.
 const SETTLED: u32 = 12;
-/// Largest distance of a ball on the floor (m). A board that turns back lifts the ball by some micrometers.
+/// Largest distance from the floor for a ball on the floor (m). A board that turns back lifts the ball by some
+/// micrometers.
 const ON_FLOOR: f32 = 2e-6;
-/// Least distance of a free ball from the walls (m).
+/// Smallest distance of a free ball from the walls (m).
 const OFF_WALLS: f32 = 2e-5;
-/// Largest distance between the centers of ball and goal at the end of a game that is won (m).
+/// Largest distance between the centers of ball and goal for a win (m).
 const ARRIVED: f32 = 0.4 * CELL;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -30,8 +31,9 @@ pub enum Outcome {
     Time,
 }
 
-/// Slip of the rolling ball: the relative speed of ball and floor at their contact (m/s), in the given number of steps. The ball rolls
-/// if it touched nothing else for a tenth of a second, in which friction ends the slip that a wall causes.
+/// Slip of the rolling ball: the relative speed of ball and floor at their contact (m/s), over the given number of
+/// steps. The ball counts as rolling if it touched nothing else for a tenth of a second: in that time friction ends the
+/// slip after a wall contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Slip {
     pub rms: f64,
@@ -43,7 +45,7 @@ pub struct Slip {
 pub trait Engine {
     fn name(&self) -> String;
     fn world(&self) -> &World;
-    /// The game writes the velocities of kinematic bodies.
+    /// The game sets the velocities of kinematic bodies.
     fn world_mut(&mut self) -> &mut World;
     fn step(&mut self, dt: f32) -> Result<()>;
 }
@@ -69,13 +71,13 @@ impl Engine for Simulation {
 pub struct Game {
     pub map: Map,
     engine: Box<dyn Engine>,
-    /// None while the game runs.
+    /// `None` while the game runs.
     pub outcome: Option<Outcome>,
     /// Tilts of the board to the right and to the front (degrees).
     pub tilt: [f32; 2],
     steps: u32,
     dt: f32,
-    /// Last steps in which the ball touched only the floor.
+    /// Number of steps since the ball last touched anything but the floor.
     rolled: u32,
     slip: Slip,
     /// Sum of the squares of the slip (m²/s²).
@@ -127,7 +129,8 @@ impl Game {
         bodies[BOARD].rotation.inverse() * bodies[BALL].position
     }
 
-    /// Tilts the board towards `wanted` (right and front, degrees) and makes one step, unless the game has ended.
+    /// Tilts the board towards `wanted` (right and front, degrees) and makes one step. It does nothing after the end of
+    /// the game.
     pub fn step(&mut self, wanted: [f32; 2]) -> Result<()> {
         if self.outcome.is_some() {
             return Ok(());
@@ -156,7 +159,7 @@ impl Game {
         Ok(())
     }
 
-    /// Measures overlap and slip by poses and velocities alone, so that engines can be compared.
+    /// Measures overlap and slip only from poses and velocities, so that engines can be compared.
     fn measure(&mut self) {
         let gap = gap(&self.map, self.ball());
         self.deepest = self.deepest.max(-gap.floor.unwrap_or(0.0)).max(-gap.wall);
@@ -199,7 +202,7 @@ pub struct Played {
 const SAMPLE: u32 = 6;
 pub const SAMPLES: f64 = 20.0;
 
-/// Plays `script` until it ends or the game is won or lost. `watch` gets the game at every sample of the track.
+/// Plays `script` until it ends or the game is won or lost. `watch` is called at every sample of the track.
 pub fn play(mut game: Game, script: &Script, mut watch: impl FnMut(&Game)) -> Result<Played> {
     let mut track = Vec::new();
     loop {

@@ -1,4 +1,4 @@
-//! The maze game: a ball on a board that tilts about two axes must roll to the goal and not into a hole.
+//! The maze game: a ball on a board that tilts about two axes has to roll to the goal and past the holes.
 
 mod board;
 mod game;

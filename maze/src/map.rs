@@ -1,4 +1,4 @@
-//! A board as text.
+//! Boards as text.
 
 use std::path::Path;
 
@@ -51,8 +51,8 @@ impl Map {
         Self::parse(name_or_path, &text)
     }
 
-    /// Reads a map: `.` floor, `#` wall, `O` hole, `S` start, `G` goal; a line is a row, and all rows have one length. Empty lines and
-    /// lines that begin with `;` are ignored.
+    /// Reads a map: `.` floor, `#` wall, `O` hole, `S` start, `G` goal. A line is a row, and all rows have the same
+    /// length. Empty lines and lines that begin with `;` are ignored.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let refuse = |line: usize, column: usize, what: String| {
             Err(Error::input(format!("{name}: line {line}, column {column}: {what}")))
@@ -106,7 +106,7 @@ impl Map {
         Ok(Self { name: name.into(), rows, columns, cells, start, goal })
     }
 
-    /// The cell at a place; beyond the map there are walls.
+    /// The cell at a place. All cells beyond the map are walls.
     pub fn at(&self, row: isize, column: isize) -> Cell {
         let inside = |x: isize, end: usize| usize::try_from(x).ok().filter(|&x| x < end);
         match (inside(row, self.rows), inside(column, self.columns)) {

@@ -1,4 +1,4 @@
-//! Finds a way to the goal and a script that follows it.
+//! Finds a path to the goal and a script that follows it.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -41,7 +41,8 @@ pub fn pilot(mut game: Game) -> Result<Script> {
         let acceleration = PULL * (way[next] - at) - DAMPING * speed;
         let slope = |a: f32| ((a / ROLLING).atan().to_degrees().clamp(-TILT_LIMIT, TILT_LIMIT) * 100.0).round() / 100.0;
         wanted = [slope(acceleration.x), slope(acceleration.y)];
-        // The script reaches the wanted tilt at its next point. The pilot plays the rounded times that `Script::text` writes.
+        // The script reaches the wanted tilt at its next point. The pilot plays the same rounded times that
+        // `Script::text` writes.
         let end = (game.time() + HOLD as f32 * game.dt()) * 1000.0;
         script.push(end.round() / 1000.0, wanted);
         for _ in 0..HOLD {
@@ -50,7 +51,7 @@ pub fn pilot(mut game: Game) -> Result<Script> {
     }
     match game.outcome {
         Some(Outcome::Goal) => {
-            // The last tilt is held for a ball that is late.
+            // Hold the last tilt, in case the ball is late.
             script.push(script.end() + 3.0, wanted);
             Ok(script)
         }
@@ -58,7 +59,7 @@ pub fn pilot(mut game: Game) -> Result<Script> {
     }
 }
 
-/// Cells of the cheapest way from the start to the goal, where cells beside holes cost more; empty without a way.
+/// Cells of the cheapest path from the start to the goal; cells beside holes cost more. Empty without a path.
 fn way(map: &Map) -> Vec<(usize, usize)> {
     let place = |(row, column): (usize, usize)| (row as isize, column as isize);
     let free = |(row, column): (isize, isize)| map.at(row, column) == Cell::Floor;

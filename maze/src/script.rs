@@ -15,7 +15,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// Reads a script: each line is `time right front` in seconds and degrees; `#` begins a comment.
+    /// Reads a script. Each line is `time right front` in seconds and degrees, and `#` starts a comment.
     pub fn parse(name: &str, text: &str) -> Result<Self> {
         let mut script = Self::default();
         for (line, row) in (1..).zip(text.lines()) {
@@ -24,7 +24,7 @@ impl Script {
             };
             let row = row.split('#').next().unwrap_or_default();
             let words: Vec<&str> = row.split_whitespace().collect();
-            // The words are slices of the row: the difference of the addresses is the column.
+            // The words are slices of the row, so the difference of the addresses is the column.
             let column = |word: &str| word.as_ptr() as usize - row.as_ptr() as usize;
             if words.is_empty() {
                 continue;
@@ -64,7 +64,8 @@ impl Script {
         self.points.last().map_or(0.0, |p| p.0)
     }
 
-    /// Tilts to the right and to the front at a time (degrees). The first point is reached from zero at time 0; the last tilt lasts.
+    /// Tilts to the right and to the front at a time (degrees). The tilt rises from zero at time 0 to the first point,
+    /// and keeps its last value.
     pub fn at(&self, time: f32) -> [f32; 2] {
         let time = time.max(0.0);
         let after = self.points.partition_point(|p| p.0 <= time);
@@ -74,7 +75,7 @@ impl Script {
         std::array::from_fn(|k| earlier.1[k] + share * (later.1[k] - earlier.1[k]))
     }
 
-    /// The script as text that [`Script::parse`] reads to the same numbers.
+    /// The script as text. [`Script::parse`] reads the same numbers from it.
     pub fn text(&self) -> String {
         let mut text = String::from("# time right front: seconds, degrees\n");
         for (time, [right, front]) in &self.points {

@@ -20,7 +20,7 @@ use crate::columns::{InputParts, Inputs, Named, OutputParts, Outputs, Record, Re
 use crate::raised;
 use crate::scene::{Config, Scene};
 
-/// A state of a world, which does not change.
+/// An immutable state of a world.
 #[pyclass(frozen, module = "drystone._drystone")]
 pub struct State(drystone::batch::State);
 
@@ -51,22 +51,22 @@ impl State {
         self.0.hash()
     }
 
-    /// Bodies, joints and drives.
+    /// Numbers of bodies, joints and drives.
     #[getter]
     fn sizes(&self) -> [usize; 3] {
         [Column::Position, Column::JointSpeed, Column::Control].map(|column| column.rows(self.0.world()))
     }
 }
 
-/// Many worlds. Arguments arrive checked.
+/// Many worlds. Python has already checked the arguments.
 #[pyclass(frozen, module = "drystone._drystone")]
 pub struct Batch(Mutex<drystone::batch::Batch>);
 
-/// What a world has while it runs.
+/// Data of a world during a run.
 struct Task<'a> {
     inputs: InputParts<'a>,
     outputs: OutputParts<'a>,
-    /// Numbers of all drives for each step, or for all steps.
+    /// Values of all drives for each step, or for all steps.
     ctrl: Option<&'a [f32]>,
     records: Vec<Record<'a>>,
 }
@@ -75,7 +75,7 @@ struct Task<'a> {
 type Worlds<'py> = PyReadonlyArray1<'py, i64>;
 /// World, kind, bodies (-1 for none) and value.
 type Event = (u32, &'static str, i64, i64, f32);
-/// Bodies, normals, impulses, and where the contacts of worlds and the points of contacts begin.
+/// Bodies, normals and impulses, and the starts of the contacts of each world and of the points of each contact.
 type ContactArrays<'py> = (
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray2<u32>>,
@@ -89,7 +89,7 @@ type ContactArrays<'py> = (
 
 #[pymethods]
 impl Batch {
-    /// A world for each scene, or `count` of one scene with one setting.
+    /// A world for each scene, or `count` worlds of one scene with one setting.
     #[staticmethod]
     fn of_scenes(
         py: Python<'_>,
@@ -111,7 +111,7 @@ impl Batch {
         made(py, threads, || drystone::batch::Batch::of_states(states.iter().map(|state| state.get().0.clone())))
     }
 
-    /// Worlds, and the most bodies, joints and drives that a world has.
+    /// Number of worlds, and the largest numbers of bodies, joints and drives of a world.
     fn sizes(&self) -> (usize, usize, usize, usize) {
         let batch = self.lock();
         let most = |column: Column| {
@@ -132,7 +132,7 @@ impl Batch {
         worlds.try_for_each(|world| world.simulation_mut().listen(listen)).map_err(raised)
     }
 
-    /// Steps worlds; returns those that failed and why.
+    /// Steps worlds. Returns the failed worlds with their errors.
     #[allow(clippy::too_many_arguments)]
     fn run(
         &self,
@@ -191,7 +191,7 @@ impl Batch {
         self.each(py, tasks, |own, member| own.iter_mut().for_each(|(column, numbers)| member.read(*column, numbers)))
     }
 
-    /// Writes a column of worlds: an array with a row a chosen world.
+    /// Writes a column of worlds, from an array with a row for each chosen world.
     fn write(&self, py: Python<'_>, worlds: Worlds<'_>, name: &str, values: PyReadonlyArray3<'_, f32>) -> PyResult<()> {
         let chosen = indices(&worlds)?;
         let column: Column = name.parse().map_err(raised)?;
@@ -207,7 +207,7 @@ impl Batch {
         tasks.into_iter().try_for_each(|(_, (_, written))| written).map_err(raised)
     }
 
-    /// Impulses on all bodies of worlds, each at a point or at the center of mass where that is NaN.
+    /// Applies impulses to all bodies of worlds, each at a point, or at the center of mass if the point is NaN.
     fn apply_impulse(
         &self,
         py: Python<'_>,
@@ -245,7 +245,7 @@ impl Batch {
         Ok(states.into_iter().flatten().collect())
     }
 
-    /// Goes on from a state for each world.
+    /// Restores a state for each world.
     fn restore(&self, py: Python<'_>, worlds: Worlds<'_>, states: Vec<Py<State>>) -> PyResult<()> {
         let chosen = indices(&worlds)?;
         let states: Vec<&drystone::batch::State> = states.iter().map(|state| &state.get().0).collect();
@@ -273,7 +273,7 @@ impl Batch {
         Ok(PyArray1::from_vec(py, all))
     }
 
-    /// Writes steps and time of all worlds.
+    /// Writes the step counts and times of all worlds.
     fn clocks(&self, mut steps: PyReadwriteArray1<'_, u64>, mut time: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
         let batch = self.lock();
         let all = batch.worlds().iter().zip(steps.as_slice_mut()?).zip(time.as_slice_mut()?);
@@ -281,7 +281,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Which bodies there are, which sleep, and the substeps of each.
+    /// Which bodies exist, which sleep, and the substeps of each.
     fn bodies(
         &self,
         mut exists: PyReadwriteArray2<'_, bool>,
@@ -330,14 +330,14 @@ impl Batch {
         ))
     }
 
-    /// World, kind, bodies (-1 for none) and value of what happened in the last step.
+    /// World, kind, bodies (-1 for none) and value of each event of the last step.
     fn events(&self, worlds: Worlds<'_>) -> PyResult<Vec<Event>> {
         let all = self.lock().events(&indices(&worlds)?).map_err(raised)?;
         let body = |body: Option<u32>| body.map_or(-1, i64::from);
         Ok(all.into_iter().map(|event| (event.world, event.kind, body(event.a), body(event.b), event.value)).collect())
     }
 
-    /// What rays hit first: writes bodies (-1 for none), distances and normals.
+    /// The first hits of rays: writes bodies (-1 for none), distances and normals.
     #[allow(clippy::too_many_arguments)]
     fn ray(
         &self,
@@ -379,7 +379,7 @@ impl Batch {
 
 impl Batch {
     fn lock(&self) -> MutexGuard<'_, drystone::batch::Batch> {
-        // A panic under the lock left worlds that are whole: a step that panics is caught.
+        // A panic under the lock leaves valid worlds, because a panicking step is caught.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -400,7 +400,7 @@ impl Task<'_> {
         }
         let Some(ctrl) = self.ctrl else { return Ok(()) };
         let drives = Column::Control.rows(world);
-        // The same numbers in every step, or numbers of each; a world may have fewer drives than others.
+        // The values are the same in every step, or given for each step. A world can have fewer drives than others.
         let width = self.inputs.iter().find(|input| input.0 == Column::Control).map_or(drives, |input| input.1.len());
         let is_each = ctrl.len() == width * steps as usize;
         let from = if is_each { width * step as usize } else { 0 };
@@ -428,7 +428,7 @@ impl Task<'_> {
     }
 }
 
-/// Makes worlds on threads of their own: after a fork those of the process are gone.
+/// Makes worlds on new threads: after a fork the threads of the process are gone.
 fn made(
     py: Python<'_>,
     threads: usize,

@@ -1,4 +1,4 @@
-//! Arrays of Python, cut by worlds.
+//! Python arrays, divided by worlds.
 
 use drystone::batch::{Column, Measure};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
@@ -9,9 +9,9 @@ use crate::raised;
 /// An array of single precision with a row of numbers for each world.
 pub type Named<'py> = (String, Bound<'py, PyArrayDyn<f32>>);
 
-/// The numbers of a world in each column.
+/// The values of a world in each column.
 pub type InputParts<'a> = Vec<(Column, &'a [f32])>;
-/// Places for them.
+/// Places for the values of a world in each column.
 pub type OutputParts<'a> = Vec<(Column, &'a mut [f32])>;
 
 /// Columns that are read while threads step worlds.
@@ -23,7 +23,7 @@ impl<'py> Inputs<'py> {
         arrays.iter().map(column).collect::<PyResult<_>>().map(Self)
     }
 
-    /// The columns, each with the numbers of every world that was chosen.
+    /// The columns, each with the values of every chosen world.
     pub fn cut(&self, worlds: usize, chosen: &[usize]) -> PyResult<Vec<InputParts<'_>>> {
         let mut all: Vec<Vec<_>> = chosen.iter().map(|_| Vec::with_capacity(self.0.len())).collect();
         for (column, array) in &self.0 {
@@ -46,7 +46,7 @@ impl<'py> Outputs<'py> {
         arrays.iter().map(column).collect::<PyResult<_>>().map(Self)
     }
 
-    /// The columns, each with the place for every world that was chosen.
+    /// The columns, each with the place for every chosen world.
     pub fn cut(&mut self, worlds: usize, chosen: &[usize]) -> PyResult<Vec<OutputParts<'_>>> {
         let mut all: Vec<Vec<_>> = chosen.iter().map(|_| Vec::with_capacity(self.0.len())).collect();
         for (column, array) in &mut self.0 {
@@ -60,14 +60,14 @@ impl<'py> Outputs<'py> {
     }
 }
 
-/// Numbers of a world after a step.
+/// The recorded values of a world after a step.
 pub enum Record<'a> {
     Column(Column, &'a mut [f32]),
     Measure(Measure, &'a mut [f64]),
     Hash(&'a mut [u64]),
 }
 
-/// Arrays for what a rollout records: those of columns, measures and hashes.
+/// Arrays for the records of a rollout: columns, measures and hashes.
 pub enum RecordArray<'py> {
     Column(Column, PyReadwriteArrayDyn<'py, f32>),
     Measure(Measure, PyReadwriteArrayDyn<'py, f64>),
@@ -75,7 +75,7 @@ pub enum RecordArray<'py> {
 }
 
 impl<'py> RecordArray<'py> {
-    /// Arrays by the names of what they record.
+    /// Arrays by the names of their records.
     pub fn all(arrays: &[(String, Bound<'py, PyAny>)]) -> PyResult<Vec<Self>> {
         arrays.iter().map(|(name, array)| Self::new(name, array)).collect()
     }
@@ -105,7 +105,7 @@ impl<'py> RecordArray<'py> {
     }
 }
 
-/// Equal parts of a slice, which may have no numbers.
+/// Equal parts of a slice. They can be empty.
 pub fn parts<T>(mut slice: &mut [T], count: usize) -> Vec<&mut [T]> {
     let each = slice.len() / count.max(1);
     (0..count)

@@ -1,5 +1,5 @@
-//! The part of the Python package that is written in Rust. `python/drystone` checks arguments and has the documentation; here arrays arrive with
-//! the right shapes and types.
+//! The Rust part of the Python package. `python/drystone` checks arguments and has the documentation. Arrays arrive
+//! here with the right shapes and types.
 
 #![deny(unsafe_code)]
 
@@ -13,9 +13,9 @@ use std::process::ExitCode;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-pyo3::create_exception!(drystone, InternalError, PyRuntimeError, "A mistake of drystone.");
+pyo3::create_exception!(drystone, InternalError, PyRuntimeError, "A defect of drystone.");
 
-/// An error of the library as one of Python.
+/// Converts an error of the library to a Python exception.
 pub fn raised(error: drystone::Error) -> PyErr {
     use drystone::Error;
     let line = error.to_string();
@@ -27,11 +27,11 @@ pub fn raised(error: drystone::Error) -> PyErr {
     }
 }
 
-/// Runs the command `drystone`; the first word is the name of the program. Returns its exit code.
+/// Runs the command `drystone`. The first word is the name of the program. Returns its exit code.
 #[pyfunction]
 fn command(py: Python<'_>, words: Vec<OsString>) -> u8 {
     let code = py.detach(|| drystone_cli::commands::main_of(&words));
-    // An exit code tells its number by comparison alone.
+    // The number of an exit code can only be found by comparison.
     (0..=u8::MAX).find(|&number| ExitCode::from(number) == code).unwrap_or(1)
 }
 

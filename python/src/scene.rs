@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use crate::raised;
 
-/// A scene, which does not change.
+/// An immutable scene.
 #[pyclass(frozen, module = "drystone._drystone")]
 pub struct Scene(pub Arc<drystone::Scene>);
 
@@ -72,7 +72,7 @@ impl Scene {
     }
 }
 
-/// Settings of the solver, which do not change.
+/// Immutable settings of the solver.
 #[pyclass(frozen, module = "drystone._drystone")]
 pub struct Config(pub SolverConfig);
 
@@ -88,7 +88,7 @@ impl Config {
     fn from_text(text: &str) -> PyResult<Self> {
         let config: SolverConfig = serde_json::from_str(text).map_err(|e| {
             let line = e.to_string();
-            // Places in a text that the caller never saw.
+            // Remove the place in the text: the caller never saw that text.
             PyValueError::new_err(line.split(" at line ").next().unwrap_or_default().to_owned())
         })?;
         config.check().map_err(raised)?;
@@ -100,7 +100,7 @@ impl Config {
     }
 }
 
-/// Name, default, least, greatest, whether whole, summary.
+/// Name, default, smallest and largest value, whether whole, summary.
 type ParameterRow = (&'static str, f64, f64, f64, bool, &'static str);
 
 /// Name, summary and parameters of every scene.

@@ -1,8 +1,9 @@
-//! From how large a scene on a GPU pays: measured on small piles that are the same everywhere.
+//! Measures the scene size from which a GPU is faster, with small piles that are the same on every machine.
 //!
-//! A step costs each backend something whatever its size (dispatches and transfers; waking threads) and something a body.
-//! Both follow from two piles, one of which is all overhead on a GPU. A pile of this kind has the contacts, colors and substeps
-//! of a settled pile of boxes and the default plan; what a GPU has of an earlier step stays there, as in a run.
+//! For each backend, a step has a fixed cost (dispatches and transfers, or waking threads) and a cost for each body.
+//! Two piles give both numbers; on a GPU the smaller one is almost only fixed cost. Such a pile has the contacts,
+//! colors and substeps of a settled pile of boxes with the default plan. As in a run, the GPU keeps rows of an earlier
+//! step.
 
 use super::{Backend, CheckedStep};
 use crate::config::SolverConfig;
@@ -15,10 +16,10 @@ use glam::Vec3;
 
 /// Bodies along each side of the two piles.
 const SIDES: [u32; 2] = [6, 20];
-/// Steps of which the fastest counts.
+/// Number of steps. The fastest one counts.
 const STEPS: u32 = 5;
 
-/// From how many bodies on a step takes `gpu` less time than `cpu`; none if it never does.
+/// The number of bodies from which a step takes less time on `gpu` than on `cpu`, or `None` if it never does.
 ///
 /// # Errors
 /// A backend cannot run.
@@ -29,8 +30,8 @@ pub fn crossover(cpu: &mut dyn Backend, gpu: &mut dyn Backend) -> Result<Option<
     Ok(crossing(piles.map(|pile| pile.bodies.len()), cpu, gpu))
 }
 
-/// From how many bodies on the line through the times of `gpu` is below that of `cpu`; none if it never is. Both were measured
-/// with so many `bodies`, few and many; no line falls, and none begins below zero.
+/// The number of bodies from which the line through the times of `gpu` is below that of `cpu`, or `None` if it never
+/// is. The times were measured with two numbers of `bodies`, few and many. No line falls, and none starts below zero.
 fn crossing(bodies: [usize; 2], cpu: [f64; 2], gpu: [f64; 2]) -> Option<usize> {
     let [few, many] = bodies.map(|n| n as f64);
     let line = |[small, large]: [f64; 2]| {
@@ -42,7 +43,7 @@ fn crossing(bodies: [usize; 2], cpu: [f64; 2], gpu: [f64; 2]) -> Option<usize> {
     (cheaper > 0.0).then(|| (dearer / cheaper).max(0.0).ceil() as usize)
 }
 
-/// Time of a step of a pile, once it has been run (s).
+/// Time of a step of a pile, after a first run (s).
 fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
     let plan = StepPlan::new(&SolverConfig::default(), pile);
     let (mut least, mut carry) = (f64::INFINITY, Carry::default());
@@ -51,7 +52,7 @@ fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
         let step = CheckedStep::new(&mut problem, &plan.passes)?;
         let start = Stopwatch::start();
         backend.step(step, &carry)?;
-        // The first compiles kernels and sends everything.
+        // The first step compiles kernels and sends all rows.
         if carry.on_device || !backend.keeps_rows() {
             least = least.min(start.elapsed().as_secs_f64());
         }
@@ -61,7 +62,7 @@ fn seconds(backend: &mut dyn Backend, pile: &StepProblem) -> Result<f64> {
     Ok(least)
 }
 
-/// Unit cubes without weight that touch their neighbors in a grid of `side` along each axis, with four points each.
+/// Weightless unit cubes in a grid of `side` along each axis. Neighbors touch with four points each.
 pub(super) fn pile(side: u32) -> StepProblem {
     let count = (side * side * side) as usize;
     let inertia = 6.0;
@@ -80,7 +81,7 @@ pub(super) fn pile(side: u32) -> StepProblem {
         params: Params { body_count: count as u32, relaxation: 1.0, ..Params::default() },
         ..StepProblem::default()
     };
-    // Every other contact along an axis: no body twice.
+    // Every other contact along an axis: then no body occurs twice.
     for (axis, stride) in [(Vec3::X, 1), (Vec3::Y, side), (Vec3::Z, side * side)] {
         for parity in 0..2 {
             let place = |body: u32| body / stride % side;
@@ -114,7 +115,7 @@ mod tests {
     use crate::backend::cpu::{Cpu, Reference};
     use std::time::Duration;
 
-    /// Times of a line of `fixed` and `a_body` at 200 and 8,000 bodies.
+    /// Times of a line with the fixed cost `fixed` and the cost `a_body` for each body, at 200 and 8,000 bodies.
     fn times(fixed: f64, a_body: f64) -> [f64; 2] {
         BODIES.map(|n| fixed + a_body * n as f64)
     }
@@ -123,12 +124,12 @@ mod tests {
 
     #[test]
     fn a_gpu_pays_from_where_the_lines_cross() {
-        // Powers of two, so that every sum is exact: 2 + n / 1024 and 5 + n / 4096 are equal at 4096.
+        // Powers of two make every sum exact: 2 + n / 1024 and 5 + n / 4096 are equal at 4096.
         let (cpu, gpu) = (times(2.0, 1.0 / 1024.0), times(5.0, 1.0 / 4096.0));
         let found = crossing(BODIES, cpu, gpu).expect("they cross");
         assert!((4096..=4097).contains(&found), "{found}");
         assert!(cpu[0] < gpu[0] && cpu[1] > gpu[1]);
-        // The other way round the GPU pays for few bodies only, so never from a number on.
+        // With the roles swapped, the GPU is faster only for few bodies, so there is no number from which it is faster.
         assert_eq!(crossing(BODIES, gpu, cpu), None);
     }
 
@@ -144,17 +145,17 @@ mod tests {
     fn a_large_pile_that_was_measured_as_faster_than_a_small_one_counts_as_free() {
         let (falling, rising) = ([4.0, 3.0], times(1.0, 0.25));
         assert_eq!(crossing(BODIES, falling, rising), None);
-        // A step costs the GPU 4 whatever its size, and the processor 1 + n / 4.
+        // A step costs the GPU a constant 4, and the processor 1 + n / 4.
         assert_eq!(crossing(BODIES, rising, falling), Some(12));
-        // As much a body, or more, than the small pile leaves for: nothing is left that does not depend on the size.
+        // The cost per body is at least the whole time of the small pile: no fixed cost remains.
         assert_eq!(crossing(BODIES, [0.0, 78.0], [0.0, 39.0]), Some(0));
     }
 
-    /// Keeps rows; sleeps in every step but the first, and notes which steps go on from its rows.
+    /// Keeps rows, sleeps in every step except the first, and records the steps that continue from its rows.
     #[derive(Default)]
     struct Sleeper(Vec<bool>);
 
-    /// The shortest time that such a step takes, however busy the machine is.
+    /// The shortest duration of such a step, however busy the machine is.
     const SLEEP: Duration = Duration::from_millis(2);
 
     impl Backend for Sleeper {

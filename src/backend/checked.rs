@@ -1,14 +1,14 @@
-//! The boundary between problems from any source and the backends that rely on them.
+//! The boundary between problems from any source and the backends that rely on their validity.
 
 use crate::error::{Error, Result};
 use crate::plan::{Kernel, Pass};
 use crate::problem::StepProblem;
 
-/// A problem and passes over it that keep what backends rely on: every index names a row that is there, no two constraints of a
-/// color have a body in common that can move, and every pass goes over colors that are there.
+/// A problem with passes that satisfy the invariants of backends: every index names an existing row, no two constraints
+/// of a color share a movable body, and every pass covers only existing colors.
 ///
-/// Threads of the CPU write bodies without locks because of this. On a GPU rows are those that are meant, because of this; shaders
-/// stay inside their buffers whatever the rows say.
+/// Because of this, threads of the CPU write bodies without locks, and a GPU accesses the intended rows. Shaders stay
+/// inside their buffers with any rows.
 #[derive(Debug)]
 pub struct CheckedStep<'a> {
     problem: &'a mut StepProblem,
@@ -16,29 +16,30 @@ pub struct CheckedStep<'a> {
 }
 
 impl<'a> CheckedStep<'a> {
-    /// Checks a problem and passes over it.
+    /// Checks a problem and its passes.
     ///
     /// # Errors
-    /// One line that names the row and the field.
+    /// One line names the row and the field.
     pub fn new(problem: &'a mut StepProblem, passes: &'a [Pass]) -> Result<Self> {
         problem.check()?;
         check_passes(problem, passes)?;
         Ok(Self { problem, passes })
     }
 
-    /// A step that the simulation built. Its stages keep the same promises: `graph` gives the colors, `problem` lays out the rows, `plan`
-    /// makes the passes, and `Simulation::step` has checked the indices of bodies and joints.
+    /// A step that the simulation built. Its stages guarantee the same invariants: `graph` assigns the colors,
+    /// `problem` lays out the rows, `plan` makes the passes, and `Simulation::step` has checked the indices of bodies
+    /// and joints.
     pub(crate) fn built(problem: &'a mut StepProblem, passes: &'a [Pass]) -> Self {
         Self { problem, passes }
     }
 
-    /// The problem, to be solved in place, and the passes.
+    /// The problem, which the backend solves in place, and the passes.
     pub fn into_parts(self) -> (&'a mut StepProblem, &'a [Pass]) {
         (self.problem, self.passes)
     }
 }
 
-/// Refuses passes over colors that are not there, and passes with patches over rows without them or the other way round.
+/// Refuses passes over colors that do not exist. Refuses passes with patches over rows without them, and the reverse.
 fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
     for (i, Pass { kernel, block, colors }) in passes.iter().enumerate() {
         let refuse = |what: String| Err(Error::input(format!("pass {i}, {}: {what}", kernel.name())));

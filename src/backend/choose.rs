@@ -1,4 +1,4 @@
-//! Which backend runs a scene.
+//! The choice of the backend for a scene.
 
 use super::Backend;
 use super::cpu::{Cpu, Reference};
@@ -7,7 +7,7 @@ use super::gpu::{AdapterChoice, Gpu, GpuOptions};
 use crate::error::Result;
 use crate::names::named;
 
-/// The backend that a user asks for.
+/// The backend that a user requests.
 ///
 /// ```
 /// use drystone::backend::BackendChoice;
@@ -19,13 +19,13 @@ use crate::names::named;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BackendChoice {
-    /// A hardware GPU, where there is one and the scene is so large that the GPU is faster, as some steps of a small pile on both
-    /// show; else the CPU.
+    /// A hardware GPU, if there is one and it is faster for the size of the scene; else the CPU. A few steps of a small
+    /// pile on both show which is faster.
     #[default]
     Auto,
-    /// The compute shaders, on the best adapter there is.
+    /// The compute shaders, on the best available adapter.
     Gpu,
-    /// The CPU, with as many threads as there are.
+    /// The CPU, with all available threads.
     Cpu,
     /// The CPU reference, one constraint at a time on one thread.
     Reference,
@@ -58,7 +58,8 @@ pub enum BackendKind {
 named!(BackendKind { F64 = "f64", Reference = "reference", Cpu = "cpu", Gpu = "gpu", });
 
 impl BackendKind {
-    /// Opens a backend of this kind, for measurements: a step fails where its device is lost. `exact` asks a GPU for the reference's bits.
+    /// Opens a backend of this kind for measurements: a step fails if its device is lost. `exact` requests a GPU with
+    /// the bits of the reference.
     ///
     /// # Errors
     /// There is no adapter.
@@ -72,15 +73,15 @@ impl BackendKind {
     }
 }
 
-/// Scenes of fewer dynamic bodies run on the processor: their steps take less time than it takes to open a GPU.
+/// Scenes with fewer dynamic bodies run on the processor: opening a GPU takes longer than their steps.
 const LEAST_BODIES: usize = 500;
 
 #[cfg(not(feature = "gpu"))]
 const WITHOUT_GPU: &str = "drystone was built without the feature gpu";
 
-/// Opens the backend for a scene of `dynamic_bodies`, and gives the reason in one line.
+/// Opens the backend for a scene of `dynamic_bodies`, and returns the reason in one line.
 ///
-/// `exact` asks a GPU for the reference's bits.
+/// `exact` requests a GPU with the bits of the reference.
 ///
 /// ```
 /// use drystone::backend::{BackendChoice, choose};
@@ -91,7 +92,7 @@ const WITHOUT_GPU: &str = "drystone was built without the feature gpu";
 /// ```
 ///
 /// # Errors
-/// A GPU is asked for by name and there is none.
+/// The caller requests a GPU and there is none.
 pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Result<(Box<dyn Backend>, String)> {
     let cpu = |why: String| -> (Box<dyn Backend>, String) { (Box::new(Cpu::new()), why) };
     match choice {
@@ -112,7 +113,7 @@ pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Resu
     }
 }
 
-/// A hardware GPU if it pays for a scene of `dynamic_bodies`, and why it does or does not.
+/// A hardware GPU if it is faster for a scene of `dynamic_bodies`, and the reason for the decision.
 #[cfg(feature = "gpu")]
 fn fastest(dynamic_bodies: usize, exact: bool) -> Result<(Option<Box<dyn Backend>>, String)> {
     let Ok(mut gpu) = Gpu::new(AdapterChoice::Hardware, exact) else {

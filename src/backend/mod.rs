@@ -1,4 +1,4 @@
-//! Backends follow a plan over a problem, in place. Only the module `gpu` of the feature `gpu` knows wgpu.
+//! Backends run a plan over a problem, in place. Only the module `gpu` of the feature `gpu` uses wgpu.
 
 pub(crate) mod calibrate;
 pub(crate) mod checked;
@@ -18,10 +18,10 @@ use crate::problem::StepProblem;
 use crate::problem::carry::Carry;
 use crate::stats::{KernelTime, Traffic};
 
-/// Work of a device that goes on while its future is awaited. A run whose future is dropped before its end leaves the problem as it was.
+/// The future of work on a device. If the future of a run is dropped before it completes, the problem stays unchanged.
 pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 
-/// Something that can run the passes of a plan.
+/// An implementation that can run the passes of a plan.
 ///
 /// ```
 /// use drystone::{Backend, Reference, Scene, Simulation, SolverConfig};
@@ -38,7 +38,7 @@ pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + '
 /// assert_eq!(problem.bodies, simulation.problem().bodies);
 /// assert_eq!((backend.traffic().up, backend.kernel_times().len()), (0, 0));
 ///
-/// // The same for a page, where other tasks go on meanwhile.
+/// // The same for a web page: other tasks continue meanwhile.
 /// use drystone::stages::{backend::CheckedStep, problem::carry::Carry};
 /// let mut repeated = problem.clone();
 /// pollster::block_on(backend.run_async(CheckedStep::new(&mut repeated, &plan.passes)?))?;
@@ -48,14 +48,14 @@ pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + '
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub trait Backend: Send {
-    /// `reference`, `cpu` or `gpu`.
+    /// One of `reference`, `cpu` and `gpu`.
     fn name(&self) -> &'static str;
 
     /// The name of the device or processor, for messages.
     fn adapter(&self) -> String;
 
-    /// Runs the passes in order; the passes write `bodies` and `impulses` of the problem. The numbers that accelerated sweeps
-    /// leave for each other stay: the next run may go on with more sweeps of the same problem.
+    /// Runs the passes in order. They write `bodies` and `impulses` of the problem. Accelerated sweeps keep their
+    /// state: the next run can continue with more sweeps of the same problem.
     ///
     /// # Errors
     /// [`CheckedStep::new`] refuses the problem or the passes, the problem does not fit the device, or the device is lost.
@@ -63,54 +63,56 @@ pub trait Backend: Send {
         self.run_checked(CheckedStep::new(problem, passes)?)
     }
 
-    /// As [`Self::run`], for what was checked before.
+    /// Like [`Self::run`], for a step that was already checked.
     ///
     /// # Errors
     /// The problem does not fit the device, or the device is lost.
     fn run_checked(&mut self, step: CheckedStep) -> Result<()>;
 
-    /// Runs the passes of a step that follows on the one before as `carry` says. A backend with a device of its own keeps the
-    /// rows there, sends what changed and brings back what moved. The problem is complete before the step and after it; a step that
-    /// fails leaves it as it was, so that another backend can repeat the step.
+    /// Runs the passes of a step that follows the previous one; `carry` describes the change. A backend with its own
+    /// device keeps the rows there, sends changed rows and reads results back. The problem is complete before and after
+    /// the step. A failed step leaves it unchanged, so that another backend can repeat the step.
     ///
     /// # Errors
-    /// As of [`Self::run_checked`].
+    /// Those of [`Self::run_checked`].
     fn step(&mut self, step: CheckedStep, _carry: &Carry) -> Result<()> {
         self.run_checked(step)
     }
 
-    /// As [`Self::run_checked`], for a page: a backend with a device of its own lets other tasks go on while the device works.
+    /// Like [`Self::run_checked`], for a web page: with its own device, a backend lets other tasks continue while the
+    /// device works.
     fn run_async<'a>(&'a mut self, step: CheckedStep<'a>) -> Running<'a> {
         Box::pin(std::future::ready(self.run_checked(step)))
     }
 
-    /// As [`Self::step`], likewise.
+    /// Like [`Self::step`], for a web page.
     fn step_async<'a>(&'a mut self, step: CheckedStep<'a>, carry: &'a Carry) -> Running<'a> {
         Box::pin(std::future::ready(self.step(step, carry)))
     }
 
-    /// Whether the rows of the last step are on a device, so that the next step can go on from them.
+    /// Whether the rows of the last step are on a device, so that the next step can continue from them.
     fn keeps_rows(&self) -> bool {
         false
     }
 
-    /// The backend that goes on after this one lost its device ([`Error::Lost`](crate::Error::Lost)); none if there is no such backend.
+    /// The backend that continues after this one lost its device ([`Error::Lost`](crate::Error::Lost)), or `None`.
     fn successor(&mut self) -> Option<Box<dyn Backend>> {
         None
     }
 
-    /// As [`Self::successor`], for a page.
+    /// Like [`Self::successor`], for a web page.
     fn successor_async(&mut self) -> Running<'_, Option<Box<dyn Backend>>> {
         Box::pin(std::future::ready(self.successor()))
     }
 
-    /// The bytes that the last step moved to a device and back.
+    /// The number of bytes that the last step moved to a device and back.
     fn traffic(&self) -> Traffic {
         Traffic::default()
     }
 
-    /// Lets the device take the time of each kernel from now on, where it has a clock; that may cost time itself. Gives the
-    /// bytes a second that the device reads and writes when it copies, to hold them against; none without a clock.
+    /// Makes the device measure the time of each kernel from now on, if it has a clock. Measuring can itself cost time.
+    /// Returns the copy bandwidth of the device for comparison (bytes read and written per second), or `None` without a
+    /// clock.
     ///
     /// # Errors
     /// The device is lost.
@@ -118,7 +120,7 @@ pub trait Backend: Send {
         Ok(None)
     }
 
-    /// How long the device was at each kernel in the last step, if it took the time.
+    /// The time of each kernel in the last step, if the device measured it.
     fn kernel_times(&self) -> &[KernelTime] {
         &[]
     }

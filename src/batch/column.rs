@@ -1,4 +1,4 @@
-//! Numbers of all bodies, joints or drives of a world in a row.
+//! Columns of numbers: a row for each body, joint or drive of a world.
 
 use glam::{Quat, Vec3};
 
@@ -7,7 +7,7 @@ use crate::error::{Result, ensure, input};
 use crate::names::named;
 use crate::world::{Axis, Drive, Joint, Linear, World};
 
-/// Numbers of a world that stand beside each other: a row for each body, joint, drive or world. See [`Member::read`].
+/// A kind of numbers of a world, with a row for each body, joint, drive or world. See [`Member::read`].
 ///
 /// ```
 /// use drystone::batch::{Batch, Column};
@@ -21,15 +21,15 @@ use crate::world::{Axis, Drive, Joint, Linear, World};
 /// // Forces last until they change.
 /// world.write(Column::Force, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0])?;
 /// assert_eq!(world.simulation().world.bodies[2].force.x, 50.0);
-/// assert!(world.write(Column::JointSpeed, &[]).is_err(), "what follows from others cannot be written");
+/// assert!(world.write(Column::JointSpeed, &[]).is_err(), "a derived column cannot be written");
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Column {
-    /// Place of each body (m).
+    /// Position of each body (m).
     Position,
-    /// Turn of each body, x y z w.
+    /// Rotation of each body, x y z w.
     Rotation,
     /// Velocity of each center of mass (m/s).
     LinearVelocity,
@@ -39,17 +39,17 @@ pub enum Column {
     Force,
     /// Lasting torque on each body (N m).
     Torque,
-    /// Coefficient of friction of each body.
+    /// Friction coefficient of each body.
     Friction,
-    /// Coefficient of restitution of each body.
+    /// Restitution coefficient of each body.
     Restitution,
     /// Gravity of the world (m/s²).
     Gravity,
-    /// Speed of each motor and target of each spring: those of [`drives`].
+    /// Speed of each motor and target of each spring, in the order of [`drives`].
     Control,
-    /// Three lengths (m) and three angles (rad) of each joint.
+    /// Three positions (m) and three angles (rad) of each joint.
     JointPosition,
-    /// Their speeds (m/s, rad/s).
+    /// Rates of the joint positions (m/s, rad/s).
     JointSpeed,
     /// Impulse of each joint on its body b in the last substep (N s).
     JointImpulse,
@@ -75,7 +75,7 @@ named!(Column {
 });
 
 impl Column {
-    /// Numbers in a row.
+    /// Number of values in a row.
     pub const fn width(self) -> usize {
         match self {
             Self::Control | Self::Friction | Self::Restitution => 1,
@@ -85,7 +85,7 @@ impl Column {
         }
     }
 
-    /// Rows that a world has.
+    /// Number of rows for a world.
     pub fn rows(self, world: &World) -> usize {
         match self {
             Self::Gravity => 1,
@@ -98,7 +98,7 @@ impl Column {
     }
 }
 
-/// A drive of a joint: the joint, and which of its axes, those to shift along (or the distance) before those to turn about.
+/// A drive of a joint: the joint, and the index of its axis. Translations (or the distance) come before rotations.
 ///
 /// ```
 /// use drystone::batch::{Column, DriveOf, drives};
@@ -115,7 +115,7 @@ pub struct DriveOf {
     pub joint: usize,
     /// Index of the axis.
     pub axis: usize,
-    /// The joint, its bodies by their names, and the axis where the joint has several drives.
+    /// The joint, its bodies by name, and the axis if the joint has several drives.
     pub name: String,
 }
 
@@ -165,7 +165,7 @@ fn aim(drive: &mut Drive) -> Option<&mut f32> {
 }
 
 impl Member {
-    /// Writes a column into `out`, row by row. What is left of it, and rows of bodies that are gone, becomes NaN.
+    /// Writes a column into `out`, row by row. The rest of `out`, and rows of vacant bodies, become NaN.
     pub fn read(&self, column: Column, out: &mut [f32]) {
         out.fill(f32::NAN);
         let world = &self.simulation().world;
@@ -191,20 +191,21 @@ impl Member {
         }
     }
 
-    /// Takes a column over: poses, velocities, forces, torques, materials, gravity or drives. Rows of bodies that are gone are passed over. Contacts
-    /// that still touch keep their impulses, and so do joints.
+    /// Sets a column: poses, velocities, forces, torques, materials, gravity or drives. Rows of vacant bodies are
+    /// skipped. Contacts that still touch keep their impulses, and so do joints.
     ///
     /// # Errors
-    /// The column follows from others, or there are fewer numbers than it has. What the numbers say is checked by the next step.
+    /// The column is derived from others and cannot be written, or there are fewer numbers than it has. The next step
+    /// checks the values.
     pub fn write(&mut self, column: Column, values: &[f32]) -> Result<()> {
         write(&mut self.simulation_mut().world, column, values)
     }
 }
 
-/// [`Member::write`], for a world.
+/// [`Member::write`] for a world.
 ///
 /// # Errors
-/// As there.
+/// Those of [`Member::write`].
 pub fn write(world: &mut World, column: Column, values: &[f32]) -> Result<()> {
     let needed = column.rows(world) * column.width();
     ensure(values.len() >= needed, || format!("{column} has {} numbers: must be {needed}", values.len()))?;

@@ -1,10 +1,11 @@
-//! Contacts and events of many worlds in columns.
+//! Contacts and events of many worlds, in columns.
 
 use super::Member;
 use crate::simulation::{Contact, Event, Hit};
 
-/// Contacts of some worlds: those of one world stand together, in the order of the worlds that were asked for, and so do the points of one
-/// contact. Within a world they ascend by the pair of bodies, which is the same order on every machine.
+/// Contacts of some worlds. The contacts of one world are contiguous, in the order of the requested worlds, and so are
+/// the points of one contact. Within a world, contacts are sorted by pairs of bodies. The order is the same on every
+/// machine.
 ///
 /// ```
 /// use drystone::batch::{Batch, Contacts};
@@ -17,26 +18,26 @@ use crate::simulation::{Contact, Event, Hit};
 /// batch.step(30, &[0, 1])?;
 /// let Contacts { world_start, bodies, impulse, point_start, .. } = batch.contacts(&[0, 1])?;
 /// assert_eq!((world_start, &bodies[..2], point_start.len()), (vec![0, 2, 4], &[[0, 1], [1, 2]][..], 5));
-/// assert!(impulse[0][1] > impulse[1][1], "the lower one bears more");
+/// assert!(impulse[0][1] > impulse[1][1], "the lower one carries more");
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contacts {
-    /// Where the contacts of each world begin, and where those of the last end.
+    /// The index of the first contact of each world, and the end of the last world.
     pub world_start: Vec<u32>,
     /// Bodies a and b of each contact.
     pub bodies: Vec<[u32; 2]>,
     /// Unit normal from a to b.
     pub normal: Vec<[f32; 3]>,
-    /// Impulse on b of the whole step (N s); zero unless the simulation listens.
+    /// Impulse on b over the whole step (N s); zero unless the simulation listens.
     pub impulse: Vec<[f32; 3]>,
-    /// Where the points of each contact begin, and where those of the last end.
+    /// The index of the first point of each contact, and the end of the last contact.
     pub point_start: Vec<u32>,
-    /// Place of each point, midway between the surfaces (m).
+    /// Position of each point, midway between the surfaces (m).
     pub point: Vec<[f32; 3]>,
-    /// Distance of the surfaces along the normal when the step began (m).
+    /// Distance of the surfaces along the normal at the start of the step (m).
     pub separation: Vec<f32>,
-    /// Normal impulse on b of the whole step (N s); zero unless the simulation listens.
+    /// Normal impulse on b over the whole step (N s); zero unless the simulation listens.
     pub point_impulse: Vec<f32>,
 }
 
@@ -66,7 +67,7 @@ impl Contacts {
     }
 }
 
-/// Bodies, then colliders, then places: parts of two shapes may have several contacts.
+/// Sort key: bodies, then colliders, then positions, because parts of two shapes can have several contacts.
 fn order(contact: &Contact) -> impl Ord + use<> {
     let (a, b) = (contact.a, contact.b);
     let pair = [a.body.index().min(b.body.index()), a.body.index().max(b.body.index()), a.collider, b.collider];
@@ -74,7 +75,7 @@ fn order(contact: &Contact) -> impl Ord + use<> {
     (pair, places)
 }
 
-/// Something that happened in a step: an [`Event`] with the indices of its bodies.
+/// An event of a step: an [`Event`] with the indices of its bodies.
 ///
 /// ```
 /// use drystone::batch::{Batch, EventRow};
@@ -93,13 +94,13 @@ fn order(contact: &Contact) -> impl Ord + use<> {
 pub struct EventRow {
     /// The world.
     pub world: u32,
-    /// began, ended, hit, entered, left, passed or broke.
+    /// One of began, ended, hit, entered, left, passed and broke.
     pub kind: &'static str,
-    /// The body with the lesser index, or that of the sensor; none for a joint.
+    /// The body with the smaller index, or the body of the sensor; `None` for a joint.
     pub a: Option<u32>,
-    /// The other one.
+    /// The other body.
     pub b: Option<u32>,
-    /// Speed of a hit (m/s), time of a passage within the step (s), or force on a joint that broke (N); else 0.
+    /// Speed of a hit (m/s), time of a passage within the step (s), or force on a broken joint (N); else 0.
     pub value: f32,
 }
 

@@ -1,4 +1,4 @@
-//! Worlds that go side by side, step by step, so that small ones fill the lanes of a processor together.
+//! Steps small worlds together, so that they fill the lanes of a processor.
 
 use std::sync::atomic::Ordering;
 
@@ -14,12 +14,13 @@ use crate::problem::join::{Alike, join, part};
 use crate::problem::{ContactSummary, StepProblem};
 use crate::world::World;
 
-/// Worlds that go side by side: as many as a processor has lanes.
+/// Number of worlds in a group: one for each lane.
 pub(super) const WORLDS: usize = 16;
-/// Rows of bodies above which a world fills the lanes by itself, and would push others out of the cache.
+/// A world with more rows of bodies than this fills the lanes by itself. In a group it would evict others from the
+/// cache.
 const MOST_BODIES: usize = 160;
 
-/// Steps as one, in memory that stands.
+/// Several steps combined into one, in reusable memory.
 #[derive(Default)]
 pub(super) struct Group {
     backend: Cpu,
@@ -28,23 +29,23 @@ pub(super) struct Group {
     key: Option<MadeFor>,
 }
 
-/// The key, rules and settings that a plan was made for.
+/// The key, rules and settings of a plan.
 type MadeFor = (PlanKey, Alike, SolverConfig);
 
-/// Where a world is in a step.
+/// The progress of a world in a step.
 #[derive(Clone, Copy, PartialEq)]
 enum Stage {
-    /// It has no more steps to do: it failed.
+    /// The world failed and takes no more steps.
     Out,
-    /// Nothing in it moves.
+    /// Nothing moves in this step.
     Still,
     /// Its step is assembled.
     Assembled,
-    /// Its step was run with those of others.
+    /// Its step ran together with those of other worlds.
     Ran,
 }
 
-/// Goes through the steps of a run; see [`Batch::run`](super::Batch::run).
+/// Runs the steps of a run; see [`Batch::run`](super::Batch::run).
 pub(super) fn run<T>(
     jobs: &mut [(&mut T, &mut Member)],
     way: Way,
@@ -87,7 +88,7 @@ pub(super) fn run<T>(
 }
 
 impl Group {
-    /// Runs steps as one that are alike; those that nothing else is alike wait to be run alone.
+    /// Runs equal kinds of steps together. A step without a match remains, to be run alone.
     fn run_alike<T>(&mut self, jobs: &mut [(&mut T, &mut Member)], stages: &mut [Stage]) {
         let small = |(member, stage): (&Member, &Stage)| {
             let simulation = member.simulation();
@@ -108,7 +109,7 @@ impl Group {
             let mut problems: Vec<&mut StepProblem> =
                 chosen.map(|(_, job)| job.1.simulation_mut().problem_mut()).collect();
             let ran = panics::caught(|| self.run_as_one(&mut problems, &config, kind));
-            // Where that failed each world runs its own step, which is as it was.
+            // If that failed, each world runs its own step, which is unchanged.
             if let Ok(Ok(())) = ran {
                 own.into_iter().for_each(|k| stages[k] = Stage::Ran);
             } else {

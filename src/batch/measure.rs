@@ -1,4 +1,4 @@
-//! Errors and sums of a world, beside its state.
+//! Error measures and sums of a world.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use super::Member;
 use crate::metrics::{self, Penetration};
 use crate::names::named;
 
-/// A number that says how well a world is solved, or what it has: [`Member::measure`].
+/// A measure of the solution error or of the content of a world: see [`Member::measure`].
 ///
 /// ```
 /// use drystone::batch::{Batch, Measure};
@@ -24,17 +24,17 @@ use crate::names::named;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Measure {
-    /// Deepest overlap of the world as it is, from contacts computed anew (m).
+    /// Deepest overlap at the present poses, from contacts that are computed anew (m).
     OverlapMax,
-    /// Mean over all contacts of the deepest point of each (m).
+    /// Mean over all contacts of the overlap at the deepest point (m).
     OverlapMean,
-    /// Depth that 95 % of the contacts do not exceed (m).
+    /// 95th percentile of the overlap of contacts (m).
     Overlap95,
-    /// Largest distance between the anchors of a joint that holds them (m).
+    /// Largest distance between the anchors of a joint that keeps them together (m).
     JointGap,
     /// Kinetic energy (J).
     KineticEnergy,
-    /// Potential energy in gravity (J).
+    /// Gravitational potential energy (J).
     PotentialEnergy,
     /// Momentum along x (N s).
     MomentumX,
@@ -50,13 +50,14 @@ pub enum Measure {
     AngularMomentumZ,
     /// Speed of the fastest dynamic body (m/s).
     Fastest,
-    /// How deep the hardest contact of the last step would sag with the substeps of the settings, over what they promise; 0 without a load.
+    /// Static compression of the most loaded contact of the last step with the substeps of the settings, divided by the
+    /// promised overlap; 0 without a load.
     Need,
-    /// Energy that the last step took out because constraints had made it (J).
+    /// Energy that the last step removed because constraints had added it (J).
     EnergyTaken,
-    /// Contacts of the last step, near ones included.
+    /// Number of contacts of the last step, including near ones.
     Contacts,
-    /// Dynamic bodies that sleep.
+    /// Number of sleeping dynamic bodies.
     Asleep,
     /// 1 if all numbers are finite, else 0.
     Finite,
@@ -84,7 +85,7 @@ named!(Measure {
 });
 
 impl Member {
-    /// Measures of the world. The three of overlap are computed once for all.
+    /// Measures of the world. The three measures of overlap are computed together.
     pub fn measure<const N: usize>(&self, measures: [Measure; N]) -> [f64; N] {
         let mut values = [0.0; N];
         self.measure_into(&measures, &mut values);

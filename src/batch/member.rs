@@ -30,7 +30,7 @@ use crate::world::World;
 /// assert_eq!(member.hash(), member.simulation().hash());
 /// let state: State = member.state();
 /// assert_eq!((state.time(), state.to_simulation().hash()), (member.time(), member.hash()));
-/// // The other one stopped before its first step, and says why.
+/// // The other world stopped before its first step, with an error.
 /// let failed = batch.world(1);
 /// assert!(failed.steps() == 0 && failed.error().is_some_and(|line| line.contains("force")));
 /// assert_eq!(failed.start().hash(), failed.hash());
@@ -42,13 +42,13 @@ pub struct Member {
     steps: u64,
     time: f64,
     start: Arc<State>,
-    /// The state before the last run, in memory that stands.
+    /// The state before the last run, in reusable memory.
     before: State,
     error: Option<String>,
     stats: StepStats,
 }
 
-/// How far a run goes.
+/// The length of a run.
 #[derive(Clone, Copy)]
 pub(super) struct Way<'a> {
     pub steps: u64,
@@ -60,7 +60,7 @@ impl Member {
     pub(super) fn new(scene: &Scene, config: &SolverConfig) -> Result<Self> {
         let comes_and_goes = !scene.spawners.is_empty() || !scene.leaving.is_empty();
         ensure(!comes_and_goes, || {
-            format!("{}: bodies come or leave by themselves, which a batch does not do", scene.name)
+            format!("{}: has spawners or leaving bodies, which a batch does not support", scene.name)
         })?;
         let worlds = scene.world.world_count();
         ensure(worlds == 1, || format!("{}: {worlds} worlds beside each other: must be one", scene.name))?;
@@ -76,22 +76,22 @@ impl Member {
         Self { simulation, dt, steps, time, start, before, error: None, stats: StepStats::default() }
     }
 
-    /// The world and all that the next step goes on from.
+    /// The simulation of this world.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
     }
 
-    /// The same, to change between two steps.
+    /// The simulation of this world, for changes between two steps.
     pub fn simulation_mut(&mut self) -> &mut Simulation {
         &mut self.simulation
     }
 
-    /// Length of a step (s) where a run gives none.
+    /// Default length of a step (s).
     pub fn dt(&self) -> f32 {
         self.dt
     }
 
-    /// Steps since the start.
+    /// Number of steps since the start.
     pub fn steps(&self) -> u64 {
         self.steps
     }
@@ -101,22 +101,24 @@ impl Member {
         self.time
     }
 
-    /// The state that a reset goes back to.
+    /// The state that a reset restores.
     pub fn start(&self) -> &Arc<State> {
         &self.start
     }
 
-    /// Why the last run of this world ended before its last step; none if it did not, and after a reset or a restore.
+    /// The error that ended the last run of this world early. It is `None` if there was none, and after a reset or a
+    /// restore.
     pub fn error(&self) -> Option<&str> {
         self.error.as_deref()
     }
 
-    /// The figures of the last step of this world; those of no step before the first one, and after a reset or a restore.
+    /// The statistics of the last step of this world. They are empty before the first step, and after a reset or a
+    /// restore.
     pub fn stats(&self) -> &StepStats {
         &self.stats
     }
 
-    /// [`Simulation::hash`]: that of the world alone.
+    /// [`Simulation::hash`] of this world alone.
     pub fn hash(&self) -> u64 {
         self.simulation.hash()
     }
@@ -139,13 +141,13 @@ impl Member {
         self.stats = StepStats::default();
     }
 
-    /// Begins a run: a step that fails goes back to where it began.
+    /// Begins a run. A failed step restores the state at its start.
     pub(super) fn begin_run(&mut self) {
         self.error = None;
         self.keep();
     }
 
-    /// Assembles a step; false if nothing moves in it.
+    /// Assembles a step. Returns false if nothing moves in it.
     pub(super) fn begin_step(
         &mut self,
         dt: Option<f32>,
@@ -158,7 +160,7 @@ impl Member {
         Ok(begun)
     }
 
-    /// Runs what is assembled, unless it ran, and stores it.
+    /// Runs the assembled step, unless it already ran, and stores it.
     pub(super) fn end_step(&mut self, dt: Option<f32>, ran: bool) -> Result<()> {
         let Self { simulation, stats, .. } = self;
         let length = dt.unwrap_or(self.dt);
@@ -172,10 +174,10 @@ impl Member {
         self.note_step(dt)
     }
 
-    /// Counts a step that is done.
+    /// Counts a completed step.
     ///
     /// # Errors
-    /// It left numbers that are none.
+    /// The step left a number that is not finite.
     pub(super) fn note_step(&mut self, dt: Option<f32>) -> Result<()> {
         if let Some(body) = self.stats.first_non_finite {
             return Err(input!("{}: is no longer finite after a step", self.simulation.world.name_of(body)));
@@ -185,7 +187,7 @@ impl Member {
         Ok(())
     }
 
-    /// Goes back to before the step that failed, and says why it did.
+    /// Restores the state before the failed step, and records the error.
     pub(super) fn fail(
         &mut self,
         error: Error,
@@ -193,11 +195,11 @@ impl Member {
         dt: Option<f32>,
         before: impl Fn(u64, &mut World) -> Result<()>,
     ) {
-        // A panic may have left the backend half done.
+        // A panic can leave the backend in an incomplete state.
         self.simulation.set_backend(Box::new(Cpu::new()));
         self.simulation.restore(&self.before.simulation);
         (self.dt, self.steps, self.time) = (self.before.dt, self.before.steps, self.before.time);
-        // Through the same steps again: after one that failed, contacts are not as they were.
+        // Repeat the same steps: a failed step changes the contacts.
         for step in 0..steps {
             let begun = self.begin_step(dt, |world| before(step, world));
             let again = begun.and_then(|begun| if begun { self.end_step(dt, false) } else { self.note_step(dt) });
@@ -206,14 +208,14 @@ impl Member {
         self.error = Some(error.to_string());
     }
 
-    /// Keeps the state of now.
+    /// Keeps the present state.
     fn keep(&mut self) {
         self.simulation.snapshot_into(&mut self.before.simulation);
         (self.before.dt, self.before.steps, self.before.time) = (self.dt, self.steps, self.time);
     }
 }
 
-/// A step that may panic.
+/// Runs a step that can panic.
 fn guarded<R>(step: impl FnOnce() -> Result<R>) -> Result<R> {
     panics::caught(step).unwrap_or_else(|panic| Err(Error::Panicked(panic.text)))
 }

@@ -1,8 +1,9 @@
-//! Many worlds at once, each with its scene, settings, start, time, steps, errors and hash.
+//! Many worlds at once. Each has its own scene, settings, start state, time, step count, error and hash.
 //!
-//! The bits of a world depend on its scene, settings and inputs alone: not on the number of worlds, its neighbors, the order of calls to others, the
-//! number of threads or the machine. Worlds that a call does not name stay as they are, to the last bit. A world that fails stops alone, as it was
-//! before the step that failed; the others finish.
+//! The bits of a world depend only on its scene, settings and inputs. They do not depend on the number of worlds, the
+//! other worlds, the order of calls to others, the number of threads, or the machine. A call does not change worlds
+//! that it does not name. If a world fails, only that world stops, in the state before the failed step; the others
+//! finish.
 //!
 //! ```
 //! use drystone::batch::Batch;
@@ -12,14 +13,14 @@
 //! let mut batch = Batch::of(&scene, &SolverConfig::default(), 4)?;
 //! assert!(batch.step(10, &[0, 2])?.is_empty(), "none fails");
 //! assert_eq!((batch.world(0).steps(), batch.world(1).steps()), (10, 0));
-//! // A state goes into other worlds, and a reset back to the start.
+//! // A state can be restored in other worlds, and a reset goes back to the start.
 //! let state = batch.world(2).state();
 //! batch.restore(1, &state)?;
 //! batch.reset(&[2])?;
 //! batch.step(5, &[0, 1])?;
 //! assert_eq!(batch.world(0).hash(), batch.world(1).hash());
 //! assert_eq!(batch.world(2).hash(), batch.world(3).hash());
-//! // Single worlds may be changed and listened to, and begin from states.
+//! // Single worlds can be changed, can listen to events, and can start from states.
 //! let mut again = Batch::of_states([state])?.on_threads(1)?;
 //! again.world_mut(0).simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
 //! again.worlds_mut()[0].simulation_mut().world.gravity.x = 0.1;
@@ -56,21 +57,21 @@ pub use member::Member;
 use member::Way;
 pub use state::State;
 
-/// How often [`Run::stop`] is asked.
+/// Interval between calls of [`Run::stop`].
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
 /// Many worlds: see the [module](self).
 pub struct Batch {
     members: Vec<Member>,
-    /// Pools of one thread each, because a world that divides no work over threads steps faster; or one pool where there are fewer worlds than
-    /// threads.
+    /// Thread pools. With one pool for each thread, a world does not divide its work, which makes its steps faster. If
+    /// there are fewer worlds than threads, there is one pool.
     pools: Vec<ThreadPool>,
     threads: usize,
-    /// Memory for worlds that go side by side.
+    /// Memory for groups of worlds.
     groups: Mutex<Vec<Group>>,
 }
 
-/// How far [`Batch::run`] goes.
+/// The length of a run of [`Batch::run`].
 ///
 /// ```
 /// use drystone::batch::Run;
@@ -80,16 +81,16 @@ pub struct Batch {
 /// ```
 #[derive(Clone, Copy, Default)]
 pub struct Run<'a> {
-    /// Steps of each world.
+    /// Number of steps of each world.
     pub steps: u64,
-    /// Length of a step (s) in place of that of each scene.
+    /// Length of a step (s), in place of that of each scene.
     pub dt: Option<f32>,
-    /// Asked every 50 ms on the thread of the caller: where it is true, each world ends between two of its steps.
+    /// Called every 50 ms on the caller's thread. If it returns true, each world stops after its present step.
     pub stop: Option<&'a dyn Fn() -> bool>,
 }
 
 impl Batch {
-    /// Worlds of scenes and settings.
+    /// A batch of worlds from scenes and settings.
     ///
     /// ```
     /// use drystone::batch::Batch;
@@ -102,16 +103,17 @@ impl Batch {
     /// ```
     ///
     /// # Errors
-    /// No world; a scene or settings that [`Simulation::new`](crate::Simulation::new) refuses; a scene whose bodies come or leave by themselves.
+    /// There is no world; [`Simulation::new`](crate::Simulation::new) refuses a scene or settings; or a scene has
+    /// spawners or leaving bodies.
     pub fn new<'a>(worlds: impl IntoIterator<Item = (&'a Scene, &'a SolverConfig)>) -> Result<Self> {
         let member = |(k, (scene, config))| Member::new(scene, config).map_err(|error| of_world(k, error));
         Self::of_members(worlds.into_iter().enumerate().map(member).collect::<Result<_>>()?)
     }
 
-    /// `count` worlds of one scene.
+    /// A batch of `count` worlds of one scene.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// Those of [`Self::new`].
     pub fn of(scene: &Scene, config: &SolverConfig, count: usize) -> Result<Self> {
         let first = Member::new(scene, config)?;
         let start = first.start().clone();
@@ -119,10 +121,10 @@ impl Batch {
         Self::of_members(std::iter::once(first).take(count).chain(others).collect())
     }
 
-    /// A world that begins at each state: a reset goes back to it.
+    /// A batch with one world for each state. A reset restores that state.
     ///
     /// # Errors
-    /// No state.
+    /// There is no state.
     pub fn of_states(states: impl IntoIterator<Item = State>) -> Result<Self> {
         Self::of_members(states.into_iter().map(|state| Member::of(Arc::new(state))).collect())
     }
@@ -132,10 +134,10 @@ impl Batch {
         Self { members, pools: Vec::new(), threads: 0, groups: Mutex::default() }.on_threads(0)
     }
 
-    /// The same worlds on so many threads, 0 for as many as the pool of the caller has. No result depends on it.
+    /// Sets the number of threads, or 0 for the size of the caller's pool. No result depends on it.
     ///
     /// # Errors
-    /// The system gives no more threads.
+    /// The system cannot start that many threads.
     pub fn on_threads(mut self, threads: usize) -> Result<Self> {
         self.threads = if threads == 0 { rayon::current_num_threads() } else { threads };
         let is_enough = self.members.len() >= self.threads;
@@ -151,12 +153,12 @@ impl Batch {
         self.members.len()
     }
 
-    /// Whether there is no world; never.
+    /// Whether there is no world; always false.
     pub fn is_empty(&self) -> bool {
         self.members.is_empty()
     }
 
-    /// The number of threads that step worlds.
+    /// The number of threads.
     pub fn threads(&self) -> usize {
         self.threads
     }
@@ -164,43 +166,45 @@ impl Batch {
     /// A world.
     ///
     /// # Panics
-    /// There is no such world.
+    /// The index is out of range.
     pub fn world(&self, world: usize) -> &Member {
         &self.members[world]
     }
 
-    /// A world, to change between two steps whatever a [`Simulation`](crate::Simulation) lets a caller change.
+    /// A world, for the changes between two steps that a [`Simulation`](crate::Simulation) allows.
     ///
     /// # Panics
-    /// There is no such world.
+    /// The index is out of range.
     pub fn world_mut(&mut self, world: usize) -> &mut Member {
         &mut self.members[world]
     }
 
-    /// All worlds in their order.
+    /// All worlds in order.
     pub fn worlds(&self) -> &[Member] {
         &self.members
     }
 
-    /// All worlds in their order, to change.
+    /// All worlds in order, mutable.
     pub fn worlds_mut(&mut self) -> &mut [Member] {
         &mut self.members
     }
 
-    /// Moves some worlds by `steps` steps; returns those that failed, ascending: [`Member::error`] says why.
+    /// Advances some worlds by `steps` steps. Returns the worlds that failed, in ascending order: [`Member::error`] has
+    /// the reason.
     ///
     /// # Errors
-    /// The worlds are not ascending, or there is none of a number. No world moved then.
+    /// The worlds are not in ascending order, or an index is out of range. No world changes then.
     pub fn step(&mut self, steps: u64, worlds: &[usize]) -> Result<Vec<usize>> {
         let tasks = worlds.iter().map(|&world| (world, ())).collect();
         self.run(Run { steps, ..Run::default() }, tasks, |_, _, _| Ok(()), |_, _, _| {})
     }
 
-    /// Moves some worlds, each with a value of its own: before each step `before` may change the world, and after it `after` may look at it.
-    /// Both are told the step, from 0 on. Returns the worlds that failed, ascending.
+    /// Advances some worlds, each with a value of the caller. `before` can change a world before each step, and `after`
+    /// can read it after each step. Both get the number of the step, from 0. Returns the worlds that failed, in
+    /// ascending order.
     ///
-    /// Up to sixteen worlds go side by side on one thread, and wait for no other world. Where a step fails, `before` is called again for the steps
-    /// that go before it, and has to do the same again.
+    /// Up to sixteen worlds run as a group on one thread, and wait for no other world. If a step fails, `before` is
+    /// called again for the steps before it, and has to make the same changes again.
     ///
     /// ```
     /// use drystone::batch::{Batch, Run};
@@ -208,7 +212,7 @@ impl Batch {
     ///
     /// let scene = Scene::find("sphere-plane", &[])?;
     /// let mut batch = Batch::of(&scene, &SolverConfig::default(), 2)?;
-    /// // Each ball is pushed by a force of its own, and the ways of both are kept.
+    /// // Each ball has its own force, and the run keeps the paths of both.
     /// let tasks = vec![(0, (0.0, Vec::new())), (1, (500.0, Vec::new()))];
     /// let mut ways = [0.0, 0.0];
     /// let failed = batch.run(
@@ -223,7 +227,7 @@ impl Batch {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Those of [`Self::step`].
     pub fn run<T: Send>(
         &mut self,
         run: Run,
@@ -236,7 +240,7 @@ impl Batch {
         let meanwhile = || is_over.store(run.stop.is_some_and(|stop| stop()), Ordering::Relaxed);
         let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
         self.check(chosen.iter().copied())?;
-        // As many worlds beside each other as fill the lanes, and at least one for each thread.
+        // As many worlds in a group as fill the lanes, and at least one group for each thread.
         let each = chosen.len().div_ceil(self.threads).clamp(1, group::WORLDS);
         let Self { members, pools, groups, .. } = self;
         let mut jobs = named(members, &mut tasks);
@@ -249,7 +253,7 @@ impl Batch {
         Ok(chosen.into_iter().filter(|&world| self.members[world].error().is_some()).collect())
     }
 
-    /// Does something with some worlds between two steps, each with a value of its own, on the threads of the batch.
+    /// Calls a function on some worlds between two steps, each with a value of the caller, on the threads of the batch.
     ///
     /// ```
     /// use drystone::batch::{Batch, Measure};
@@ -264,7 +268,7 @@ impl Batch {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Those of [`Self::step`].
     pub fn each<T: Send>(
         &mut self,
         mut tasks: Vec<(usize, T)>,
@@ -276,45 +280,46 @@ impl Batch {
         Ok(())
     }
 
-    /// Lets worlds begin again: each has the bits of one that never ran.
+    /// Resets worlds to their start. Each has the bits of a world that never ran.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Those of [`Self::step`].
     pub fn reset(&mut self, worlds: &[usize]) -> Result<()> {
         self.check(worlds.iter().copied())?;
         worlds.iter().for_each(|&world| self.members[world].reset());
         Ok(())
     }
 
-    /// Lets a world go on from a state, of any world: it has the bits of the world that went on from there.
+    /// Sets a world to a state of any world. It continues with the bits of a world that continued from that state.
     ///
     /// # Errors
-    /// There is no such world.
+    /// The index is out of range.
     pub fn restore(&mut self, world: usize, state: &State) -> Result<()> {
         self.check([world])?;
         self.members[world].restore(state);
         Ok(())
     }
 
-    /// The events of the last step of some worlds, in the order of the worlds and, within each, of [`Simulation::events`](crate::Simulation::events).
+    /// The events of the last step of some worlds, in the order of the worlds. Within each world they are in the order
+    /// of [`Simulation::events`](crate::Simulation::events).
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Those of [`Self::step`].
     pub fn events(&self, worlds: &[usize]) -> Result<Vec<EventRow>> {
         self.check(worlds.iter().copied())?;
         Ok(worlds.iter().flat_map(|&world| contacts::events(world, &self.members[world])).collect())
     }
 
-    /// The contacts of some worlds as the last step left them: ascending by the worlds, then by the pairs of bodies.
+    /// The contacts of some worlds after the last step, sorted by worlds, then by pairs of bodies.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Those of [`Self::step`].
     pub fn contacts(&self, worlds: &[usize]) -> Result<Contacts> {
         self.check(worlds.iter().copied())?;
         Ok(Contacts::of(worlds.iter().map(|&world| &self.members[world])))
     }
 
-    /// Refuses worlds that are not there or not ascending.
+    /// Refuses worlds that are out of range or not in ascending order.
     fn check(&self, worlds: impl IntoIterator<Item = usize>) -> Result<()> {
         let (count, mut last) = (self.members.len(), None);
         for world in worlds {
@@ -326,7 +331,8 @@ impl Batch {
     }
 }
 
-/// Does jobs on pools, the first job first, while this thread asks `meanwhile` now and then until all are done.
+/// Runs jobs on pools, the first job first. Meanwhile this thread calls `meanwhile` at intervals until all jobs are
+/// done.
 fn spread<J: Send>(pools: &[ThreadPool], jobs: Vec<J>, work: &(impl Fn(J) + Sync), meanwhile: &dyn Fn()) {
     let (is_running, all_done) = mpsc::channel::<()>();
     let wait = || {
@@ -353,7 +359,7 @@ fn spread<J: Send>(pools: &[ThreadPool], jobs: Vec<J>, work: &(impl Fn(J) + Sync
     on_each(pools, is_running, &drain, &wait);
 }
 
-/// Runs `drain` on every pool, and `wait` beside them. The last end of `is_running` goes with the last pool.
+/// Runs `drain` on every pool, and `wait` on this thread. The last pool to finish drops the last copy of `is_running`.
 fn on_each(pools: &[ThreadPool], is_running: Sender<()>, drain: &(dyn Fn() + Sync), wait: &dyn Fn()) {
     let [first, others @ ..] = pools else {
         drop(is_running);
@@ -369,7 +375,7 @@ fn on_each(pools: &[ThreadPool], is_running: Sender<()>, drain: &(dyn Fn() + Syn
     });
 }
 
-/// The worlds that tasks name, each with its task.
+/// The named worlds, each with its task.
 fn named<'a, T>(members: &'a mut [Member], tasks: &'a mut [(usize, T)]) -> Vec<(&'a mut T, &'a mut Member)> {
     let mut tasks = tasks.iter_mut().peekable();
     let of_task = |(k, member)| tasks.next_if(|task| task.0 == k).map(|task| (&mut task.1, member));
@@ -380,7 +386,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// An error of a world.
+/// Adds the index of a world to an error.
 fn of_world(world: usize, error: crate::Error) -> crate::Error {
     match error {
         crate::Error::Input(line) => input!("world {world}: {line}"),

@@ -1,4 +1,4 @@
-//! The state of a world of a batch, to go back to.
+//! Saved states of a world of a batch.
 
 use crate::backend::cpu::Cpu;
 use crate::config::check_step_length;
@@ -6,7 +6,7 @@ use crate::error::{Error, Result, input};
 use crate::simulation::{Simulation, Snapshot};
 use crate::world::World;
 
-/// The state of a world of a [`Batch`](super::Batch) between two steps, with its time and steps.
+/// The state of a world of a [`Batch`](super::Batch) between two steps, with its time and step count.
 ///
 /// ```
 /// use drystone::batch::{Batch, State};
@@ -33,11 +33,11 @@ pub struct State {
 
 /// The first bytes of a saved world of a batch.
 const MAGIC: [u8; 8] = *b"drybatch";
-/// Bytes before those of the simulation: the magic, the length of a step, steps and time, and the hash of the three.
+/// Size of the header (bytes): the magic, the length of a step, steps and time, and the hash of the three.
 const HEADER: usize = 8 + 4 + 8 + 8 + 8;
 
 impl State {
-    /// Steps since the start.
+    /// Number of steps since the start.
     pub fn steps(&self) -> u64 {
         self.steps
     }
@@ -57,7 +57,7 @@ impl State {
         self.simulation.hash()
     }
 
-    /// A simulation that goes on from the state.
+    /// A simulation that continues from the state.
     pub fn to_simulation(&self) -> Simulation {
         Simulation::of_snapshot(self.simulation.clone(), Box::new(Cpu::new()))
     }
@@ -69,18 +69,18 @@ impl State {
         [MAGIC.as_slice(), &numbers, &hash, &self.to_simulation().save()].concat()
     }
 
-    /// The state that was saved.
+    /// Loads a saved state.
     ///
     /// # Errors
-    /// The bytes are none of a saved world, of another version, damaged or cut short.
+    /// The bytes are not a saved world of a batch, have another version, or are damaged or cut short.
     pub fn load(bytes: &[u8]) -> Result<Self> {
         let (header, simulation) = bytes.split_first_chunk::<HEADER>().ok_or_else(|| refused("cut short"))?;
         let (magic, numbers, hash) = (&header[..8], &header[8..28], &header[28..]);
         if magic != MAGIC {
-            return Err(refused("these bytes are none"));
+            return Err(refused("these bytes are not a saved world of a batch"));
         }
         if crate::saved::hash_of(numbers).to_le_bytes() != *hash {
-            return Err(refused("damaged: the hash of its time is another"));
+            return Err(refused("damaged: the hash of its time differs"));
         }
         let eight = |from: usize| numbers[from..from + 8].try_into().unwrap_or_default();
         let dt = f32::from_le_bytes(numbers[..4].try_into().unwrap_or_default());

@@ -1,17 +1,19 @@
-//! The direction along which two solids are furthest apart, found by an ellipse that shrinks around it.
+//! Finds the direction along which two solids are furthest apart, with a shrinking ellipse around that direction.
 //!
-//! Directions near another one are points of the plane across it, and the least of w · d over all vectors w from a point of one solid to
-//! a point of the other is concave there: at each direction the vector between the furthest points halves the ellipse.
+//! Directions near a given one are points of the plane across it. Let w range over all vectors from a point of one
+//! solid to a point of the other. The least of w · d is concave on that plane, so the vector between the furthest
+//! points halves the ellipse at each direction.
 
 use glam::{Mat2, Vec2, Vec3};
 
-/// Tangent of the largest angle between the first direction and those that are tried.
+/// Tangent of the largest angle between the first direction and the tested ones.
 const REACH: f32 = 1.0;
-/// Most directions that are tried. Each takes the area of the ellipse to 0.77 of what it was.
+/// Largest number of tested directions. Each one reduces the area of the ellipse to 0.77 of its value.
 const MOST: u32 = 80;
 
-/// The direction near `start` along which two solids are furthest apart, and how far (m), to `exact`. `gap` gives the vector from the furthest
-/// point of the first in a direction to that of the second in the opposite one.
+/// The direction near `start` along which two solids are furthest apart, and their distance (m), with an error of
+/// `exact`. `gap` returns the vector from the support point of the first solid in a direction to the support point of
+/// the second in the opposite direction.
 pub(super) fn ascend(start: Vec3, exact: f32, gap: impl Fn(Vec3) -> Vec3) -> (f32, Vec3) {
     let (across, along) = start.any_orthonormal_pair();
     let (mut center, mut ellipse) = (Vec2::ZERO, Mat2::from_diagonal(Vec2::splat(REACH * REACH)));
@@ -27,7 +29,7 @@ pub(super) fn ascend(start: Vec3, exact: f32, gap: impl Fn(Vec3) -> Vec3) -> (f3
         let rise = w - distance * d;
         let rise = Vec2::new(rise.dot(across), rise.dot(along));
         let turn = ellipse * rise;
-        // The most that any direction in the ellipse may bring.
+        // Upper bound of the gain within the ellipse.
         let most = rise.dot(turn).max(0.0).sqrt();
         if most <= exact * length {
             break;

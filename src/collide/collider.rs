@@ -1,4 +1,4 @@
-//! Colliders, bodies and margins in the form that the detection reads.
+//! Colliders, bodies and margins, in the layout that the detection reads.
 
 use glam::{Quat, Vec3};
 use parry3d::bounding_volume::Aabb;
@@ -11,24 +11,24 @@ use crate::world::{Body, BodyKind, Collider, Shape, placed};
 /// How a body takes part in the detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// Does not move, and nothing is solved for it.
+    /// Does not move, and the step solves nothing for it.
     Still,
-    /// Moves by itself: cannot be pushed, but may wake what it touches.
+    /// Moves on its own: contacts cannot push it, but it can wake the bodies that it touches.
     Moving,
-    /// Can be pushed.
+    /// Contacts can push it.
     Awake,
 }
 
 crate::saved::kinds!(Activity { Still, Moving, Awake });
 
-/// A collider with what the detection asks of it all the time.
+/// A collider with the data that the detection reads most often.
 #[derive(Clone)]
 pub(super) struct ColliderInfo {
     pub body: u32,
     /// Index among the colliders of the body.
     pub index: u32,
     pub shape: SharedShape,
-    /// Place in the body's frame.
+    /// Pose in the body's frame.
     pub local: Pose,
     /// Half extents of a cuboid (m).
     pub cuboid: Option<Vec3>,
@@ -36,17 +36,17 @@ pub(super) struct ColliderInfo {
     pub size: f32,
     /// Radius around the body's origin that holds the collider (m).
     pub reach: f32,
-    /// Half-spaces have no box to put into the tree.
+    /// Whether it is a half-space, which has no box for the tree.
     pub unbounded: bool,
-    /// Whether it meets others without contacts.
+    /// Whether it is a sensor.
     pub sensor: bool,
 }
 
-/// The body of a collider that is gone.
+/// The body index of a removed collider.
 const NO_BODY: u32 = u32::MAX;
 
 impl ColliderInfo {
-    /// The collider of a body with this index among those of the body.
+    /// The collider at this index on a body.
     pub fn new(body: u32, index: u32, c: &Collider) -> Self {
         Self {
             body,
@@ -61,23 +61,23 @@ impl ColliderInfo {
         }
     }
 
-    /// A collider that is gone.
+    /// A removed collider.
     pub fn gone() -> Self {
         let (position, rotation) = (Vec3::ZERO, Quat::IDENTITY);
         Self::new(NO_BODY, 0, &Collider { shape: Shape::ball(1.0), position, rotation, sensor: false })
     }
 
-    /// Marks a collider that is gone.
+    /// Marks the collider as removed.
     pub fn leave(&mut self) {
         self.body = NO_BODY;
     }
 
-    /// Whether the collider is gone.
+    /// Whether the collider was removed.
     pub fn is_gone(&self) -> bool {
         self.body == NO_BODY
     }
 
-    /// The box around it when its body is at `pose`. That of a cuboid needs nothing from elsewhere in memory.
+    /// Its box when the body is at `pose`. The box of a cuboid needs no other memory.
     pub fn aabb(&self, pose: Pose) -> Aabb {
         let pose = placed(pose, self.local);
         let Some(half) = self.cuboid else { return self.shape.compute_aabb(&pose) };
@@ -85,7 +85,7 @@ impl ColliderInfo {
         Aabb::from_half_extents(pose.translation, axes.abs() * half)
     }
 
-    /// Whether this is still the collider of a body.
+    /// Whether this entry still describes the collider of a body.
     pub fn is(&self, body: usize, collider: &Collider) -> bool {
         self.body as usize == body
             && self.sensor == collider.sensor
@@ -98,8 +98,8 @@ impl ColliderInfo {
     }
 }
 
-/// Pose and velocity of a body, as far as the detection needs it: three rows of eight numbers, so that lanes can gather them. The first two
-/// are what the test of a pair reads.
+/// Pose and velocity of a body for the detection: three rows of eight numbers, so that lanes can gather them. The test
+/// of a pair reads the first two rows.
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct BodyState {
@@ -111,14 +111,14 @@ pub(super) struct BodyState {
     pub w: Vec3,
     /// 1 if contacts can be computed, otherwise 0.
     pub in_range: f32,
-    /// 0 if it is still, 1 if it moves by itself, 2 if it is awake.
+    /// 0 if it does not move, 1 if it moves on its own, 2 if it is awake.
     pub activity: f32,
     pub position: Vec3,
-    /// Size of the gravity that it feels over that of its world; 0 if it cannot be pushed.
+    /// Gravity of the body divided by the gravity of its world, in size; 0 if contacts cannot push it.
     pub gravity_scale: f32,
     /// Acceleration by gravity and by lasting forces (m/s²).
     pub pull: Vec3,
-    /// 1 if a joint holds it, otherwise 0.
+    /// 1 if a joint holds the body, otherwise 0.
     pub tied: f32,
 }
 
@@ -129,7 +129,7 @@ pub(super) const VELOCITY: usize = 1;
 /// The row that begins with the position.
 pub(super) const POSITION: usize = 2;
 
-/// A cuboid in the form that lanes gather: two rows of eight numbers.
+/// A cuboid in a layout that lanes can gather: two rows of eight numbers.
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct CuboidPlace {
@@ -147,7 +147,7 @@ impl CuboidPlace {
         Self { rotation, position, half, ..Self::default() }
     }
 
-    /// The place of a collider; zero if it is no cuboid.
+    /// The row of a collider; zero if it is not a cuboid.
     pub fn of(c: &ColliderInfo) -> Self {
         c.cuboid.map(|half| Self::new(half, c.local.translation, c.local.rotation)).unwrap_or_default()
     }
@@ -158,7 +158,7 @@ impl CuboidPlace {
 }
 
 impl BodyState {
-    /// A body on which gravity acts so much (m/s²).
+    /// A body with this acceleration by gravity (m/s²).
     pub fn of(body: &Body, activity: Activity, gravity: Vec3) -> Self {
         let (position, rotation) = (body.position, body.rotation);
         let moves = body.kind != BodyKind::Fixed;
@@ -184,16 +184,17 @@ impl BodyState {
     }
 }
 
-/// Farthest that something is from the origin and still touches anything (m): the square is far inside of single precision.
+/// Largest distance from the origin at which a body still touches anything (m). Its square is far below the
+/// single-precision limit.
 pub(super) const FARTHEST: f32 = 1e15;
 
-/// Whether contacts can be computed at a pose, at most `farthest` from the origin along each axis (m): parry squares lengths, and takes rotations
-/// for unit quaternions.
+/// Whether contacts can be computed at a pose, at most `farthest` from the origin along each axis (m): parry squares
+/// lengths, and expects unit quaternions.
 pub(super) fn is_placed(position: Vec3, rotation: Quat, farthest: f32) -> bool {
     position.abs().cmple(Vec3::splat(farthest)).all() && (squared_length(rotation) - 1.0).abs() < 0.1
 }
 
-/// Whether a box is so near that something may touch it.
+/// Whether a box is near enough to the origin to touch anything.
 pub(super) fn is_in_range(aabb: &Aabb) -> bool {
     let farthest = glam::Vec3::splat(FARTHEST);
     aabb.mins.abs().cmple(farthest).all() && aabb.maxs.abs().cmple(farthest).all()
@@ -204,7 +205,7 @@ pub(super) fn is_in_range(aabb: &Aabb) -> bool {
 pub(super) struct Margins {
     pub speculative: f32,
     pub recycle: f32,
-    /// How far gravity moves any body of the world in one step (m); with a gravity scale of 1 at least.
+    /// Displacement by gravity of any body of the world in one step, at a gravity scale of at least 1 (m).
     pub fall: f32,
     /// Lengths of the step and of its longest substep (s).
     pub dt: f32,

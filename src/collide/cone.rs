@@ -4,13 +4,13 @@ use glam::Vec3;
 use parry3d::query::details::NormalConstraints;
 use parry3d::shape::TrianglePseudoNormals;
 
-/// How far a direction in a cone may be outside of it by rounding.
+/// Rounding error up to which a direction counts as inside the cone.
 const ROUNDING: f32 = 1e-6;
-/// Cosine of the angle from which on a direction is across a normal.
+/// Cosine of the angle from which a direction counts as perpendicular to a normal.
 const ACROSS: f32 = 1e-3;
 
-/// The unit vector in the cone of some directions that is nearest to `d`; one of them where all are across it, and none without any. The
-/// directions have unit length and are in one half-space.
+/// The unit vector nearest to `d` in the cone of some directions. If all directions are perpendicular to `d`, it is one
+/// of them. Returns `None` without directions. The directions have unit length and lie in one half-space.
 pub(super) fn nearest(directions: &[Vec3], d: Vec3) -> Option<Vec3> {
     let mut best = *directions.iter().max_by(|f, g| f.dot(d).total_cmp(&g.dot(d)))?;
     for (i, &f) in directions.iter().enumerate() {
@@ -34,8 +34,9 @@ pub(super) fn nearest(directions: &[Vec3], d: Vec3) -> Option<Vec3> {
     Some(best)
 }
 
-/// The normals that a triangle of a mesh may touch with: its own, those of the triangles beside it, and those between. parry lets a direction
-/// pass that is as far from the triangle's normal as one of the neighbors' is, whatever side it leans to.
+/// The contact normals that a mesh triangle allows: its own normal, those of the adjacent triangles, and all between.
+/// Parry also accepts a direction on the wrong side, if its angle to the triangle's normal is no larger than that of a
+/// neighbor's normal.
 pub(super) struct FacetCone {
     face: Vec3,
     directions: [Vec3; 4],
@@ -51,7 +52,7 @@ impl FacetCone {
 impl NormalConstraints for FacetCone {
     fn project_local_normal_mut(&self, d: &mut Vec3) -> bool {
         let is_in_front = d.dot(self.face) >= 0.0;
-        // Rounding alone would choose among normals that are all across the direction.
+        // Among normals that are all perpendicular to the direction, rounding alone would choose.
         *d = nearest(&self.directions, *d).filter(|normal| normal.dot(*d) > ACROSS).unwrap_or(self.face);
         is_in_front
     }
@@ -73,7 +74,8 @@ mod tests {
         assert_eq!(nearest(&[], Vec3::X), None);
     }
 
-    /// The outer edge of a field has a normal aside, and the edges within it have none: what comes along the field is turned up.
+    /// At the outer edge of a field the normal points sideways. Inner edges have no such normal: a direction along the
+    /// field is turned up.
     #[test]
     fn an_edge_aside_lets_no_direction_along_the_triangle_pass() {
         let edges = [Vec3::Y, Vec3::new(0.0, 1.0, -1.0).normalize(), Vec3::Y];

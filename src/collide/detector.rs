@@ -1,4 +1,4 @@
-//! The contacts of all worlds, kept from step to step.
+//! The contacts of all worlds, which persist from step to step.
 
 use std::collections::HashSet;
 
@@ -19,36 +19,36 @@ use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, BodyKind, Groups, Joint, World};
 
-/// Finds the contacts of a world, or of several beside each other, and keeps them from step to step.
+/// Finds the contacts of one world or of several worlds beside each other, and keeps them from step to step.
 pub struct Detector {
     pub(super) worlds: Vec<WorldContacts>,
-    /// The bodies that it knows, by their indices.
+    /// The known bodies, by index.
     pub(super) known: Vec<KnownBody>,
     pub(super) kinds: Vec<BodyKind>,
     pub(super) groups: Vec<Groups>,
-    /// The bodies as the last detection found them.
+    /// The bodies at the last detection.
     pub(super) moving: Vec<BodyState>,
-    /// Their sizes; none if they have to be found anew.
+    /// The sizes of the bodies; empty if they have to be computed.
     pub(super) extents: Vec<Extent>,
-    /// Where the last step left each body. What has to stay the same for a body to sleep is kept by `sleep`, which stands
-    /// above the detector.
+    /// The pose of each body after the last step. The `sleep` module, which builds on the detector, keeps the state
+    /// that decides whether a body can sleep.
     left: Vec<Left>,
-    /// How far gravity moves a body in one step, in each world (m).
+    /// Displacement by gravity in one step, in each world (m).
     falls: Vec<f32>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
     pub(super) jointed: HashSet<(u32, u32)>,
-    /// What sensors overlapped when that was last asked.
+    /// The result of the last call of [`Self::sense`].
     overlaps: Vec<Overlap>,
 }
 
 crate::saved::cloned!(Detector { worlds, known, kinds, groups, extents, left, jointed } scratch { moving, falls, overlaps });
 
-/// A body as the detector knows it.
+/// A body, as the detector knows it.
 #[derive(Clone, Copy, Default)]
 pub(super) struct KnownBody {
     generation: u32,
     pub(super) world: u32,
-    /// Its colliders, among those of its world.
+    /// Its colliders in its world.
     pub(super) colliders: ColliderRange,
 }
 
@@ -62,8 +62,8 @@ fn jointed(world: &World) -> HashSet<(u32, u32)> {
 }
 
 impl Detector {
-    /// Writes all that lasts, or reads it: for the bodies of `world`. `base` guesses the distance up to which contacts are predicted: its
-    /// share of the size of a pair, and what is added (m).
+    /// Writes or reads all lasting state, for the bodies of `world`. `base` is a guess of the prediction distance: a
+    /// share of the size of a pair, and an additional length (m).
     pub(crate) fn walk<A: Archive>(&mut self, world: &World, base: [f32; 2], archive: &mut A) -> Result<()> {
         let bodies = archive.count(self.known.len())?;
         if A::READS {
@@ -73,7 +73,8 @@ impl Detector {
             self.groups.resize(bodies, Groups::ALL);
             self.left.resize(bodies, Left::default());
         }
-        // Whether the colliders of a body are still those of the world, and whether the body is where it was left.
+        // Whether each body has the colliders that it has in the world, and whether it has the pose that the last step
+        // left.
         let (mut are_current, mut are_left) = (vec![false; bodies], vec![false; bodies]);
         let mut end = 0;
         archive.runs(bodies, |i, archive| {
@@ -84,7 +85,7 @@ impl Detector {
             known.generation.walk(archive)?;
             known.world.walk(archive)?;
             known.colliders.count.walk(archive)?;
-            // Most bodies have their colliders behind those of the body before.
+            // The colliders of most bodies follow those of the body before.
             let mut is_behind = known.colliders.first == end;
             is_behind.walk(archive)?;
             if !is_behind {
@@ -125,19 +126,19 @@ impl Detector {
         })
     }
 
-    /// The kinds of the bodies that it knows.
+    /// The kinds of the known bodies.
     pub(crate) fn kinds(&self) -> &[BodyKind] {
         &self.kinds
     }
 
-    /// All pairs, each with its world and its place there.
+    /// All pairs, each with its world and its index there.
     pub(crate) fn placed_pairs(&self) -> impl Iterator<Item = ([u32; 2], &Pair)> {
         (0..)
             .zip(&self.worlds)
             .flat_map(|(part, world)| (0..).zip(&world.pairs[..]).map(move |(i, pair)| ([part, i], pair)))
     }
 
-    /// A detector for the bodies of `world` as they are now.
+    /// A detector for the present bodies of `world`.
     pub fn new(world: &World) -> Self {
         let mut detector = Self {
             worlds: Vec::new(),
@@ -155,8 +156,8 @@ impl Detector {
         detector
     }
 
-    /// The bodies that came, went, or changed kind, groups or shapes since the last call of [`Self::follow_bodies`], and those
-    /// that do not fit, ascending.
+    /// The bodies that were added or removed, or that changed kind, groups or shapes, since the last
+    /// [`Self::follow_bodies`], and the bodies for which `fits` returns false. In ascending order.
     pub fn changed_bodies(&self, world: &World, fits: impl Fn(usize, &Body) -> bool + Sync) -> Vec<usize> {
         let (generations, worlds) = (world.bodies.generations(), world.bodies.worlds());
         let is_other = |i: usize| {
@@ -166,7 +167,7 @@ impl Detector {
             !same || !self.has_shapes_of(i, *known, body) || !fits(i, body)
         };
         let all = (0..world.bodies.len().max(self.known.len())).into_par_iter().with_min_len(1024);
-        // Most steps change none, and then nothing is allocated.
+        // In most steps no body changes, and nothing is allocated.
         if all.clone().any(is_other) { all.filter(|&i| is_other(i)).collect() } else { Vec::new() }
     }
 
@@ -175,7 +176,7 @@ impl Detector {
         colliders.len() == body.colliders.len() && colliders.iter().zip(&body.colliders).all(|(c, now)| c.is(i, now))
     }
 
-    /// Takes over the bodies that [`Self::changed_bodies`] found. The contacts of such a body end.
+    /// Updates the bodies that [`Self::changed_bodies`] found. Their contacts end.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         self.extents.clear();
         let count = world.bodies.len().max(self.known.len());
@@ -183,7 +184,7 @@ impl Detector {
         self.kinds.resize(count, BodyKind::Fixed);
         self.groups.resize(count, Groups::ALL);
         self.worlds.resize(self.worlds.len().max(world.world_count()), WorldContacts::default());
-        // All leave before any comes, so that the order of indices does not decide which places are free.
+        // Remove all colliders before adding any, so that the order of indices does not decide which places are free.
         for &i in changed {
             let KnownBody { world, colliders, .. } = self.known[i];
             self.worlds[world as usize].remove(colliders);
@@ -201,19 +202,19 @@ impl Detector {
         changed.iter().filter(|&&i| i < world.bodies.len()).for_each(|&i| self.left[i] = Left::of(&world.bodies[i]));
     }
 
-    /// Ends the contacts of bodies that the caller put elsewhere since [`Self::note_left`].
+    /// Ends the contacts of bodies that the caller moved since [`Self::note_left`].
     pub fn end_teleported(&mut self, world: &World) {
         if let Some(teleports) = Teleports::find(&self.left, &world.bodies) {
             self.worlds.iter_mut().for_each(|part| teleports.end_contacts(&self.kinds, &mut part.pairs));
         }
     }
 
-    /// Notes where a step left the bodies.
+    /// Records the poses of the bodies after a step.
     pub fn note_left(&mut self, world: &World) {
         world.bodies.par_iter().with_min_len(1024).map(Left::of).collect_into_vec(&mut self.left);
     }
 
-    /// Takes over which bodies joints keep from colliding.
+    /// Updates the pairs of bodies that joints keep from colliding.
     pub fn follow_joints(&mut self, world: &World) {
         let jointed = jointed(world);
         if jointed != self.jointed {
@@ -222,7 +223,7 @@ impl Detector {
         }
     }
 
-    /// Whether the body at an index is the one that the last detection knew.
+    /// Whether the last detection knew the body at this index.
     pub fn knows(&self, world: &World, body: usize) -> bool {
         let now = world.bodies.generations().get(body);
         !world.bodies.is_vacant(body) && self.known.get(body).map(|known| &known.generation) == now
@@ -233,7 +234,8 @@ impl Detector {
         self.worlds.iter().any(WorldContacts::has_sensors)
     }
 
-    /// The colliders that sensors overlap at the poses of `world`, in any order; after the detection of the step that left them.
+    /// The colliders that overlap sensors at the poses of `world`, in any order. Call it after the detection of the
+    /// step that led to these poses.
     pub fn sense(&mut self, world: &World, activity: &[Activity]) -> &[Overlap] {
         let Self { worlds, kinds, groups, jointed, overlaps, .. } = self;
         overlaps.clear();
@@ -242,19 +244,20 @@ impl Detector {
         overlaps
     }
 
-    /// The pairs whose boxes overlap, with the manifolds they touch with, world by world. The order is the same for any
-    /// thread count, and within a world whatever stands beside it.
+    /// The pairs whose boxes overlap, with their manifolds, world by world. The order is the same for any thread count.
+    /// Within a world it does not depend on the other worlds.
     pub fn pairs(&self) -> impl Iterator<Item = &Pair> + Clone {
         self.worlds.iter().flat_map(|world| world.pairs.iter())
     }
 
-    /// Tells what changed since the last call. The listener gives slots to manifolds that have none, and removes manifolds that ended.
+    /// Reports changes since the last call. The listener gives slots to manifolds that have none, and removes ended
+    /// manifolds.
     pub(crate) fn take_changes(&mut self, tell: &mut dyn FnMut(Change)) {
         (0..).zip(&mut self.worlds).for_each(|(index, world)| world.take_changes(index, tell));
     }
 
-    /// The colliders of `world` where they are now. The tree of the last detection says only which of them are near each other, so that
-    /// the world may have changed in any way.
+    /// The colliders of `world` at their present poses. The tree of the last detection only decides which of them are
+    /// stored near each other, so the world may have changed in any way.
     pub(crate) fn places(&self, world: &World) -> Vec<Places> {
         let count = |i: usize| {
             let known = self.known.get(i).filter(|known| known.world == world.bodies.worlds()[i]);
@@ -265,7 +268,7 @@ impl Detector {
         Places::of(world, count, standing)
     }
 
-    /// A pair by its world and its place there.
+    /// A pair by its world and its index there.
     pub fn pair(&self, world: u32, pair: u32) -> &Pair {
         &self.worlds[world as usize].pairs[pair as usize]
     }
@@ -275,14 +278,15 @@ impl Detector {
         &mut self.worlds[world as usize].pairs[pair as usize]
     }
 
-    /// Where the bodies of a pair were when its manifolds were computed; none if they never were, or a body is out of range.
+    /// The poses of the bodies of a pair when its manifolds were computed. Returns `None` if they never were, or if a
+    /// body is out of range.
     pub fn computed_at(&self, world: u32, pair: u32) -> Option<&[Placed; 2]> {
         self.worlds[world as usize].pairs.computed_at(pair as usize)
     }
 
-    /// Brings the pairs to the poses of `world`, for a step of `dt` seconds: manifolds that are reused stay as they are, and
-    /// their pairs know where the bodies were. Pairs of bodies that are still keep what they have, and take no part in
-    /// the step; without `activity` all take part.
+    /// Updates the pairs to the poses of `world`, for a step of `dt` seconds. Reused manifolds stay unchanged, and
+    /// their pairs keep the poses at which they were computed. Pairs without an active body stay unchanged and take no
+    /// part in the step. Without `activity`, all pairs take part.
     pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
         let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i), world.gravity_on(i));

@@ -1,4 +1,4 @@
-//! Contacts against the true distance: the largest, over all directions, of the gap between the two shapes along one of them.
+//! Tests of contacts against the true distance: the largest gap between the two shapes along any direction.
 
 use glam::{DVec3, Quat, Vec3};
 use parry3d::bounding_volume::BoundingVolume;
@@ -29,12 +29,12 @@ fn solids(scale: f32) -> Vec<(&'static str, SharedShape)> {
     ]
 }
 
-/// Half of the least side of all of them, over their size.
+/// Half of the smallest side of all of them, over their size.
 const SIZE: f32 = 0.06;
 /// Sizes (m): ordinary shapes, and shapes of 0.4 mm.
 const SIZES: [f32; 2] = [1.0, 1.0 / 256.0];
 
-/// The largest gap over directions: spread evenly, then closer and closer to the best.
+/// The largest gap over directions: an even grid first, then refinement around the best one.
 fn true_distance(along: impl Fn(Vec3) -> f32) -> f32 {
     let golden = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
     let spread = (0..2000).map(|i| {
@@ -65,8 +65,8 @@ fn deepest(found: &ParryManifold) -> f32 {
     found.points.iter().map(|p| p.dist).fold(f32::INFINITY, f32::min)
 }
 
-/// Whether a contact is as far apart as the shapes are; none where these are further apart than a tenth of the prediction or deeper than
-/// a tenth of their size.
+/// Whether a contact has the true distance of the shapes. Returns `None` if they are further apart than a tenth of the
+/// prediction, or deeper than a tenth of their size.
 fn is_true(
     what: &str,
     found: &ParryManifold,
@@ -112,8 +112,8 @@ fn compare_triangles(s: f32) {
     assert!(compared.len() > 250 && compared.iter().all(|is_true| *is_true), "{} compared", compared.len());
 }
 
-/// parry's search gives the cylinder a direction along which the two overlap by 0.23 m, and the face's normal one by 0.17 m: it lies beside
-/// the triangle, whose corner its rim touches.
+/// Parry's search returns a direction along which the cylinder overlaps by 0.23 m, and the face normal gives 0.17 m.
+/// But the cylinder lies beside the triangle: its rim touches only the corner.
 #[test]
 fn a_cylinder_that_touches_the_corner_of_a_triangle_does_not_overlap_it() {
     let shape = SharedShape::cylinder(0.3092692, 0.3597973);
@@ -141,7 +141,7 @@ fn two_solids_are_as_far_apart_as_the_contact_says() {
 }
 
 fn compare_solids(s: f32) {
-    // Pairs without a round rim, and with one.
+    // Pairs without a round rim, and pairs with one.
     let (mut random, mut compared) = (Random(2), [Vec::new(), Vec::new()]);
     let has_rim = |name: &str| ["cylinder", "cone"].contains(&name);
     let search = ContactQuery { prediction: 0.02 * s, size: SIZE * s };
@@ -149,7 +149,7 @@ fn compare_solids(s: f32) {
     others.push(("block", SharedShape::cuboid(0.4 * s, 0.2 * s, 0.4 * s)));
     let mut seconds = solids(s);
     if s < 1.0 {
-        // parry's answer for larger balls beside hulls is up to 3.5 mm off.
+        // Parry's result for larger balls beside hulls is up to 3.5 mm off.
         seconds.push(("ball", SharedShape::ball(0.06 * s)));
     }
     for (name, a) in &others {
@@ -157,7 +157,7 @@ fn compare_solids(s: f32) {
             for case in 0..200 {
                 let direction = random.vector().normalize();
                 let rotation = random.rotation();
-                // As far out as they touch along some direction, more or less.
+                // The distance at which they touch along some direction, more or less.
                 let reach = |shape: &SharedShape, d: Vec3| {
                     shape.as_support_map().expect("convex").local_support_point(d).dot(d)
                 };
@@ -204,7 +204,7 @@ fn furthest(shape: &SharedShape, d: DVec3) -> DVec3 {
     }
 }
 
-/// The largest gap over directions, in double precision: spread densely, then closer and closer to each of the best.
+/// The largest gap over directions, in double precision: a dense grid first, then refinement around each of the best.
 fn sampled_distance(along: impl Fn(DVec3) -> f64, directions: &[DVec3]) -> f64 {
     let mut sorted: Vec<(f64, DVec3)> = directions.iter().map(|&d| (along(d), d)).collect();
     sorted.sort_by(|p, q| q.0.total_cmp(&p.0));
@@ -231,7 +231,7 @@ fn sampled_distance(along: impl Fn(DVec3) -> f64, directions: &[DVec3]) -> f64 {
     refined.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Cylinders and cones of 0.1 m beside every solid: their contacts are within 0.5 mm of the truth.
+/// Contacts of cylinders and cones of 0.1 m with every solid are within 0.5 mm of the true distance.
 #[test]
 fn rims_are_as_far_apart_as_dense_sampling_says() {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -254,7 +254,7 @@ fn rims_are_as_far_apart_as_dense_sampling_says() {
         let (at, turn) = (pos12.translation.as_dvec3(), pos12.rotation.as_dquat().normalize());
         let along = |d: DVec3| d.dot(at + turn * furthest(b, turn.inverse() * -d) - furthest(a, d));
         let distance = sampled_distance(along, &directions);
-        // Shallow, and nearer than a tenth of the prediction.
+        // Keep shallow overlaps, and distances below a tenth of the prediction.
         if !(-0.1 * f64::from(SIZE)..0.002).contains(&distance) {
             return None;
         }
@@ -272,7 +272,7 @@ fn rims_are_as_far_apart_as_dense_sampling_says() {
     assert!(errors.len() >= 1000 && wrong == 0, "{wrong} of {} wrong, the worst by {worst} m", errors.len());
 }
 
-/// The contact of a cone or cylinder that lies on its side reaches from one end to the other.
+/// A cone or cylinder on its side has contacts at both ends.
 #[test]
 fn what_lies_on_its_side_touches_with_both_ends() {
     let search = ContactQuery { prediction: 0.02, size: SIZE };

@@ -1,9 +1,9 @@
-//! Contact of a convex shape with what is flat: a half-space, and each triangle of a mesh or height field.
+//! Contacts of a convex shape with flat geometry: a half-space, or each triangle of a mesh or height field.
 //!
-//! parry looks for the direction of such a contact with GJK and EPA, whose tolerances grow with the triangle, and throws the
-//! contact away where the direction points behind the triangle. Of 2000 cones of 0.1 m that lay 1 mm deep in a triangle, EPA gave
-//! 190 the direction behind; of cones that touched a triangle of 60 m, GJK gave 12 % one aslant, 8 mm too long or too short.
-//! Here the normal of the face is tried first, along which the distance has a closed form.
+//! Parry finds the direction of such a contact with GJK and EPA. Their tolerances grow with the triangle, and parry
+//! drops a contact whose direction points behind the triangle. Of 2000 cones of 0.1 m that lay 1 mm deep in a triangle,
+//! EPA gave 190 the direction behind. Of cones that touched a triangle of 60 m, GJK gave 12 % an oblique direction,
+//! with an error of 8 mm. Therefore this module tries the face normal first: the distance along it has a closed form.
 
 use glam::Vec3;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -19,7 +19,7 @@ use super::solid::{
     clip_to, magnification,
 };
 
-/// The contact of a half-space with a convex shape at `pos12`; none for a ball.
+/// The contact of a half-space with a convex shape at `pos12`. Returns `None` for a ball.
 pub(super) fn half_space_contact(
     normal: Vec3,
     shape: &dyn Shape,
@@ -38,7 +38,8 @@ pub(super) fn half_space_contact(
     Some(())
 }
 
-/// The contacts of a mesh or height field with a convex shape at `pos12`, one for each triangle, in an order of the mesh's own.
+/// The contacts of a mesh or height field with a convex shape at `pos12`: one for each triangle, in an order that the
+/// mesh decides.
 pub(super) fn composite_contacts(
     composite: &dyn Shape,
     shape: &dyn Shape,
@@ -48,7 +49,7 @@ pub(super) fn composite_contacts(
     many: &mut Vec<ParryManifold>,
 ) {
     let around = shape.compute_aabb(pos12).loosened(search.prediction);
-    // As seen from the shape's middle: numbers as small as the shape is.
+    // In the frame of the shape's middle, numbers are as small as the shape.
     let convex = Solid::new(shape, Pose::from_parts(Vec3::ZERO, pos12.rotation));
     let near = Aabb::new(around.mins - pos12.translation, around.maxs - pos12.translation).loosened(search.size);
     let mut with = |i: u32, triangle: &Triangle, cone: &dyn Fn() -> Option<TrianglePseudoNormals>| {
@@ -78,9 +79,9 @@ pub(super) fn composite_contacts(
     }
 }
 
-/// The contact of a triangle with a convex shape, where it is nearer than `prediction` and on the triangle's side. Only what is in the
-/// box `near` counts. Normals stay within `cone`, so that nothing stumbles over edges between triangles; without one the triangle
-/// has two sides.
+/// The contact of a triangle with a convex shape that is nearer than `prediction` and on the front of the triangle.
+/// Only geometry within the box `near` counts. Normals stay within `cone`, so bodies do not catch on edges between
+/// triangles. Without a cone the triangle has two sides.
 pub(super) fn triangle_contact(
     [a, mut b, mut c]: [Vec3; 3],
     cone: &dyn Fn() -> Option<TrianglePseudoNormals>,
@@ -108,7 +109,8 @@ pub(super) fn triangle_contact(
     let lowest = polygon.iter().map(|corner| face.dot(corner.0 - a)).fold(f32::INFINITY, f32::min) - convex.radius;
     let mut best = (above, face);
     let mut closest = None;
-    // Otherwise the face is the nearest feature, or the overlap is so small that another could be no better by much.
+    // Otherwise the face is the nearest feature, or the overlap is so small that another feature would not be much
+    // better.
     if lowest > above + EXACT * size || above < -DEEP * size {
         patch.clear();
         patch.extend(base);
@@ -120,7 +122,7 @@ pub(super) fn triangle_contact(
             return None;
         }
         let patch = Patch(patch);
-        // At most the true distance, and as much for the best direction.
+        // A lower bound of the true distance, exact for the best direction.
         let along = |d: Vec3| d.dot(convex.furthest(-d) - patch.local_support_point(d)) - convex.radius;
         let mut consider = |d: Vec3, distance: f32| {
             let is_better = distance > best.0;
@@ -137,7 +139,7 @@ pub(super) fn triangle_contact(
         if !is_flat {
             let by = magnification(size);
             let (patch, solid) = (Magnified { map: &patch, by }, Magnified { map: convex.map, by });
-            // Finds a direction while the solid is pushed off the face by a length.
+            // Finds a direction after the solid is pushed off the face by a length.
             let search = |push: f32| {
                 let pose = Pose::from_parts(by * (convex.pose.translation + push * face), convex.pose.rotation);
                 let (most, simplex) = (by * (prediction + push + convex.radius), &mut VoronoiSimplex::new());
@@ -160,7 +162,8 @@ pub(super) fn triangle_contact(
                 }
                 _ => false,
             };
-            // Shapes that just touch can leave the search without a direction. None through the face parts them.
+            // For shapes that just touch, the search can end without a direction. No direction through the face
+            // separates them.
             if !is_true
                 && let GJKResult::ClosestPoints(.., d) | GJKResult::NoIntersection(d) = search(PUSH * size)
                 && d.dot(face) > 0.0
@@ -183,7 +186,7 @@ pub(super) fn triangle_contact(
     }
     found.local_n1 = normal;
     found.local_n2 = convex.pose.rotation.inverse() * -normal;
-    // A normal that was turned into the cone may go far through the shape.
+    // A normal that was turned into the cone can point far through the shape.
     let least = 5.0 * distance.min(0.0) - DEEP * size;
     if face.dot(normal) > 0.1 {
         convex.corners(-normal, corners);
@@ -193,7 +196,7 @@ pub(super) fn triangle_contact(
     }
     let mut closest = closest.filter(|closest| closest.0 == normal);
     if closest.is_none() && found.points.is_empty() && normal == direction {
-        // Beside the triangle: the solid's nearest point touches the edge.
+        // Beside the triangle, the nearest point of the solid touches the edge.
         let on_solid = convex.furthest(-normal);
         closest = Some((normal, on_solid - normal * (distance + convex.radius), on_solid, distance));
     }

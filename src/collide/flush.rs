@@ -1,9 +1,9 @@
-//! The contacts of shapes that lie flush with others.
+//! Corrects the contacts of shapes that lie flush with others.
 //!
-//! Each pair of shapes is seen alone. Of a row of boxes each has edges and sides that the boxes do not have together: a body that
-//! slides along the row, and overlaps it by a hair, is nearest to the next box at the edge or even at the side that the box before
-//! it hides. Here the normal of a contact is brought into the cone of normals that all shapes at the point of contact have
-//! together: the plane across such a normal leaves all of them on one side.
+//! Detection sees each pair of shapes alone. In a row of boxes, each box has edges and sides that are hidden in the
+//! row. A body that slides along the row with a tiny overlap is then nearest to an edge of the next box, or even to its
+//! hidden side. This module brings the normal of a contact into the cone of normals that all shapes at the contact
+//! point have together: the plane across such a normal leaves all of them on one side.
 
 use glam::Vec3;
 use parry3d::bounding_volume::Aabb;
@@ -18,19 +18,19 @@ use super::tree::Tree;
 use super::world_contacts::{DetectionInput, Plane, key};
 use crate::world::{BodyKind, seen_from};
 
-/// Sine of the angle up to which a direction is the same as another.
+/// Sine of the angle up to which two directions are equal.
 const SAME: f32 = 1e-5;
-/// Deepest overlap along a normal in the cone, relative to the thinner shape's smallest half extent, beside five times the overlap along
-/// the normal outside of it: one that was turned into the cone may go far through the shape.
+/// A normal that was turned into the cone can point far through the shape. The deepest allowed overlap along it is five
+/// times the overlap along the original normal plus this, relative to the smallest half extent of the thinner shape.
 const DEEPEST: f32 = 0.5;
 
-/// Sine of the angle by which the direction of a contact may be off: parry's search ends where the distance is right to 1e-3 of itself. A point
-/// is off by as much of the distance and of the radius of what is round.
+/// Sine of the largest error of a contact direction: parry's search ends when the distance is right to 1e-3 of itself.
+/// The error of a point is this share of the distance and of the radius of a round shape.
 const ASLANT: f32 = 0.05;
-/// How far off a place may be by rounding, relative to its distance from the origin.
+/// Rounding error of a position, relative to its distance from the origin.
 const ROUNDING: f32 = 5e-7;
 
-/// The colliders of a world, as far as contacts with what lies flush depend on them.
+/// The colliders of a world that can lie flush with others.
 pub(super) struct Neighbors<'a> {
     pub colliders: &'a [ColliderInfo],
     pub tree: &'a Tree,
@@ -38,7 +38,7 @@ pub(super) struct Neighbors<'a> {
     pub input: &'a DetectionInput<'a>,
 }
 
-/// Memory that one thread reuses from pair to pair.
+/// Reusable memory of one thread.
 #[derive(Default)]
 pub(super) struct FlushScratch {
     near: Vec<u32>,
@@ -46,22 +46,22 @@ pub(super) struct FlushScratch {
     directions: Vec<Vec3>,
 }
 
-/// A direction out of a face that is one of all shapes at a point.
+/// The outward normal of a face that belongs to all shapes at a point.
 #[derive(Clone, Copy)]
 struct Face {
     normal: Vec3,
-    /// Whether the shape of the contact has it.
+    /// Whether the shape of the contact has this face.
     is_own: bool,
 }
 
 impl Face {
-    /// Whether another direction is the same but for rounding and for what flush faces may differ by.
+    /// Whether another direction is equal except for rounding and for the tolerance of flush faces.
     fn is_as(&self, normal: Vec3) -> bool {
         self.normal.distance(normal) < EXACT
     }
 }
 
-/// A shape, in the frame of the one whose contact it is.
+/// A shape, in the frame of the shape whose contact is corrected.
 struct Flush<'a> {
     collider: &'a ColliderInfo,
     pose: Pose,
@@ -72,7 +72,7 @@ impl Flush<'_> {
         self.collider.shape.distance_to_local_point(self.pose.inverse_transform_point(p), true) <= exact
     }
 
-    /// How far it reaches beyond the plane through `p` with the unit normal `n`, and how far from `p` (m).
+    /// Its extent beyond the plane through `p` with the unit normal `n`, and its distance from `p` (m).
     fn beyond(&self, n: Vec3, p: Vec3, size: f32) -> (f32, f32) {
         let own = self.pose.rotation.inverse() * n;
         if let Some(plane) = self.collider.shape.as_halfspace() {
@@ -98,7 +98,7 @@ impl Flush<'_> {
     }
 }
 
-/// Whose contact it is, where that shape and the other are, and how near the two may be.
+/// The shape whose contact is corrected, the poses of that shape and of the other, and their largest distance.
 #[derive(Clone, Copy)]
 struct Of {
     own: u32,
@@ -109,7 +109,8 @@ struct Of {
 }
 
 impl Neighbors<'_> {
-    /// Brings the contact of two convex colliders into the cones of normals of what lies flush with either; returns whether that changed it.
+    /// Corrects the contact of two convex colliders with the shapes that lie flush with either. Returns whether the
+    /// contact changed.
     pub fn mend(
         &self,
         [a, b]: [u32; 2],
@@ -134,20 +135,21 @@ impl Neighbors<'_> {
         is_mended
     }
 
-    /// Whether the second of two bodies is fixed, and meets the first.
+    /// Whether the second of two bodies is fixed and collides with the first.
     pub fn may_hold(&self, body: u32, other: u32) -> bool {
         let DetectionInput { kinds, groups, jointed, .. } = self.input;
         let meets = || groups[body as usize].meets(groups[other as usize]);
         kinds[other as usize] == BodyKind::Fixed && meets() && !jointed.contains(&key(body, other))
     }
 
-    /// Whether other colliders may stay where they are as seen from one: those of a body that nothing pushes.
+    /// Whether other colliders can keep their poses relative to this one: true for the colliders of a body that
+    /// contacts cannot push.
     fn may_lie_flush(&self, own: u32) -> bool {
         let c = &self.colliders[own as usize];
         !c.unbounded && self.input.kinds[c.body as usize] != BodyKind::Dynamic
     }
 
-    /// The same with what lies flush with the first shape.
+    /// The same for shapes that lie flush with the first shape.
     fn mend_first(
         &self,
         of: Of,
@@ -157,7 +159,7 @@ impl Neighbors<'_> {
     ) -> bool {
         let ContactQuery { prediction, size } = of.search;
         let [own, other] = [of.own, of.other].map(|c| &self.colliders[c as usize]);
-        // No finer than places are.
+        // No finer than the rounding of positions.
         let exact = (EXACT * size).max(ROUNDING * of.pose.translation.abs().max_element());
         let Some(solid) = Solid::new(&*own.shape, Pose::IDENTITY) else { return false };
         let other_pose = seen_from(of.pose, of.other_pose);
@@ -175,7 +177,7 @@ impl Neighbors<'_> {
         for point in &found.points {
             let p = point.local_p1;
             let around = exact.max(TRUE * size).max(ASLANT * (bend + point.dist));
-            // parry's other points may lie anywhere on the shape.
+            // Parry's other points can lie anywhere on the shape.
             if point.dist > nearest_dist + around {
                 continue;
             }
@@ -191,7 +193,7 @@ impl Neighbors<'_> {
             faces.clear();
             solid.each_normal(|normal| faces.push(Face { normal, is_own: true }));
             near.iter().for_each(|c| flush(c).each_face(faces));
-            // Points that parry finds on an edge lie beside it by more than flush faces differ.
+            // Points that parry finds on an edge lie beside it by more than the tolerance of flush faces.
             faces.retain(|face| {
                 let d = face.normal;
                 let top = solid.furthest(d);
@@ -223,7 +225,8 @@ impl Neighbors<'_> {
         true
     }
 
-    /// Finds the colliders whose boxes hold a point of the world, that stay where they are as seen from `own`, and that meet the other.
+    /// Finds colliders whose boxes contain a point of the world. They keep their poses relative to `own`, and collide
+    /// with the other body.
     fn find_near(&self, Of { own, other, .. }: Of, p: Vec3, around: f32, near: &mut Vec<u32>) {
         let DetectionInput { kinds, groups, jointed, .. } = *self.input;
         let [body, guest] = [own, other].map(|c| self.colliders[c as usize].body);
@@ -245,7 +248,7 @@ impl Neighbors<'_> {
             }
         });
         near.extend(self.planes.iter().map(|plane| plane.collider).filter(|&c| stays(c)));
-        // Whatever order the tree has.
+        // Makes the order independent of the tree.
         near.sort_unstable();
     }
 }

@@ -1,7 +1,8 @@
-//! What stops bodies that a step moved far, where their ways pass through something.
+//! Stops bodies that moved far in a step if their path passes through something.
 //!
-//! Contacts act along the ways that bodies would take if nothing else touched them. Bodies bounce, and others push them, within a step: where the way
-//! from the begin of the step to its end still passes through fixed geometry, the body stays where the two meet, and the next step has their contact.
+//! Contacts act along the paths that bodies would take without contact. But bodies bounce and push each other within a
+//! step. If the path from the start of the step to its end still passes through fixed geometry, the body stops where
+//! the two meet, and the next step has their contact.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -21,13 +22,15 @@ use crate::graph::Islands;
 use crate::math::rotation::product;
 use crate::world::{Body, BodyKind, World, placed};
 
-/// How far a body moves in a step before its way is looked at, relative to its smallest half extent.
+/// Displacement in a step from which the path of a body is checked, relative to its smallest half extent.
 const FAR: f32 = 0.5;
 
-/// Radius of the ball around the middle of a shape that passes through nothing, relative to the smallest half extent.
+/// Radius of a ball around the middle of a shape that must not pass through anything, relative to the smallest half
+/// extent.
 const HEART: f32 = 0.1;
 
-/// Half of the smallest side of the thinnest collider of a body, and the radius around its origin that holds all of them (m).
+/// Half of the smallest side of the thinnest collider of a body, and the radius around its origin that contains all of
+/// them (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extent {
     thin: f32,
@@ -40,7 +43,7 @@ impl Extent {
         colliders.iter().fold(none, |all, c| Self { thin: all.thin.min(c.size), reach: all.reach.max(c.reach) })
     }
 
-    /// Whether a body that was there and is now here moved far.
+    /// Whether a body moved far between two poses.
     fn is_far(self, then: &BodyState, now: &Body) -> bool {
         let shift = now.center_of_mass().distance(then.center);
         let turn = 2.0 * product(now.rotation, then.rotation.inverse()).xyz().length();
@@ -48,20 +51,21 @@ impl Extent {
     }
 }
 
-/// Where a body is stopped.
+/// The place where a body is stopped.
 #[derive(Clone, Copy)]
 struct End {
     at: Station,
-    /// After which share of the step.
+    /// Time of the stop, as a share of the step.
     share: f32,
-    /// The normal against which it no longer moves, or zero: that of a surface that it touched when the step began, and that its contact could not keep
-    /// it off, because the body turns by much in a step.
+    /// The normal along which the body loses its approach velocity, or zero. It belongs to a surface that the body
+    /// touched at the start of the step. Its contact could not hold the body, because the body turns by a large angle
+    /// in a step.
     against: Vec3,
     /// The velocity of that surface (m/s).
     pace: Vec3,
 }
 
-/// The way that a body took.
+/// The path that a body took.
 fn way(then: &BodyState, now: &Body, dt: f32) -> Way {
     let begin = Station { center: then.center, rotation: then.rotation };
     let end = Station { center: now.center_of_mass(), rotation: now.rotation };
@@ -69,7 +73,7 @@ fn way(then: &BodyState, now: &Body, dt: f32) -> Way {
 }
 
 impl Detector {
-    /// The bodies that the step moved far, ascending.
+    /// The bodies that moved far in the step, in ascending order.
     fn far_bodies(&mut self, world: &World, activity: &[Activity]) -> Vec<u32> {
         if self.extents.len() != self.known.len() {
             let Self { extents, known, worlds, .. } = self;
@@ -86,12 +90,13 @@ impl Detector {
         };
         let count = self.moving.len().min(world.bodies.len()).min(self.extents.len());
         let all = (0..count).into_par_iter().with_min_len(1024);
-        // Most steps move none, and then nothing is allocated.
+        // In most steps no body moves far, and nothing is allocated.
         if all.clone().any(|i| is_far(&i)) { all.filter(is_far).map(|i| i as u32).collect() } else { Vec::new() }
     }
 
-    /// Stops what moved far where its way passes through fixed geometry, after a step of `dt` seconds that left the bodies as they are in `world`; returns
-    /// the bodies that moved far, and those that joints hold and that were stopped. What is stopped keeps its velocity, less what gravity gave it for the rest of the step.
+    /// Stops bodies that moved far at the place where their path enters fixed geometry, after a step of `dt` seconds
+    /// that led to the poses in `world`. Returns the bodies that moved far, and the stopped bodies that joints hold. A
+    /// stopped body keeps its velocity, minus the change by gravity over the rest of the step.
     pub fn hold(&mut self, world: &mut World, dt: f32, activity: &[Activity]) -> (Vec<u32>, Vec<usize>) {
         let far = self.far_bodies(world, activity);
         let is_dynamic = |&&i: &&u32| world.bodies[i as usize].kind == BodyKind::Dynamic;
@@ -100,7 +105,7 @@ impl Detector {
         for &(i, End { at: Station { center, rotation }, share, against, pace }) in &ends {
             let body = &mut world.bodies[i as usize];
             body.linear_velocity -= (body.linear_velocity - pace).dot(against).min(0.0) * against;
-            // As seen from the body, its spin stays, and with it the energy.
+            // In the frame of the body the spin is unchanged, and so is the energy.
             body.angular_velocity = rotation * (body.rotation.inverse() * body.angular_velocity);
             body.rotation = rotation;
             body.position = center - rotation * body.mass.center;
@@ -110,8 +115,8 @@ impl Detector {
         (far, tied.collect())
     }
 
-    /// Where bodies are stopped, of which some are: what joints hold together stays together, each body where its way is when the first of them is
-    /// stopped.
+    /// Extends stops to jointed bodies. Bodies that joints hold together stay together: each one stops on its path at
+    /// the time when the first of them stops.
     fn hold_joints(&self, world: &World, mut ends: Vec<(u32, End)>, dt: f32) -> Vec<(u32, End)> {
         let is_tied = |i: u32| self.moving[i as usize].tied == 1.0;
         if !ends.iter().any(|&(i, _)| is_tied(i)) {
@@ -142,13 +147,13 @@ impl Detector {
         ends
     }
 
-    /// Where a body is stopped; none where it goes on.
+    /// The place where a body stops, or `None` if it does not.
     fn end(&self, world: &World, i: u32, dt: f32) -> Option<End> {
         let (then, now) = (&self.moving[i as usize], &world.bodies[i as usize]);
         let mut way = way(then, now, dt);
         let mut end = None;
         if let Some((Impact { time, normal, is_deep }, other)) = self.first_on(world, i, &way, dt, true) {
-            // It goes on with what it met.
+            // It goes on together with the body that it met.
             let Station { center, rotation } = way.at(time);
             let other = self.way_of(world, other, dt);
             let center = center + (1.0 - time) * other.shift;
@@ -171,7 +176,8 @@ impl Detector {
         way(&self.moving[i as usize], &world.bodies[i as usize], dt)
     }
 
-    /// What a body meets first on its way, and when: what moves, or what is fixed. Of what can be pushed only a body that is marked meets any.
+    /// The first obstacle of a body on its path, and the time: a moving one, or a fixed one. Of bodies that contacts
+    /// can push, only a bullet meets moving obstacles.
     fn first_on(&self, world: &World, i: u32, way: &Way, dt: f32, moves: bool) -> Option<(Impact, u32)> {
         let (known, then) = (self.known[i as usize], &self.moving[i as usize]);
         let part = &self.worlds[known.world as usize];
@@ -191,16 +197,18 @@ impl Detector {
                 let until = if is_pushed { Until::Touch } else { Until::Deep };
                 let standing = Swept::new(other, &self.moving[other.body as usize], &others);
                 let found = impact(standing, own, c.size, until, true);
-                // What gets too deep stays where the surfaces meet. A way may be a little inside where a body turns off a surface within the step.
+                // A body that gets too deep stops where the surfaces meet. A path can begin a little inside if the body
+                // turned off a surface within the step.
                 let found = match found {
                     Some(found) if !found.is_deep => impact(standing, own, c.size, Until::Touch, true).or(Some(found)),
                     found => found,
                 };
-                // The middle of what turns too fast for its way to be known, or is deep already, does not pass.
+                // If a body turns too fast for its path to be known, or is already deep, at least its middle does not
+                // pass through.
                 let heart = Ball::new(HEART * c.size);
                 let middle = || impact(standing, own.heart(&heart), heart.radius, until, true);
                 let found = [found, middle()].into_iter().flatten().min_by(|x, y| x.time.total_cmp(&y.time));
-                // Of two that are met at once, the one with the lesser index.
+                // Of two obstacles at the same time, take the one with the smaller index.
                 let is_first = |found: &Impact| {
                     first.get().is_none_or(|(known, body)| (found.time, other.body) < (known.time, body))
                 };
@@ -213,14 +221,15 @@ impl Detector {
         first.get()
     }
 
-    /// Whether a body stayed where it was in the step, and nothing can push it.
+    /// Whether a body kept its pose in the step and contacts cannot push it.
     fn is_still(&self, world: &World, i: u32) -> bool {
         let (then, now) = (&self.moving[i as usize], &world.bodies[i as usize]);
         let stays = || then.position == now.position && then.rotation == now.rotation;
         self.kinds[i as usize] == BodyKind::Fixed || self.kinds[i as usize] == BodyKind::Kinematic && stays()
     }
 
-    /// The colliders that met a sensor on their ways through the step, with the time of that (s): of bodies that moved far. Ascending.
+    /// The colliders that passed through a sensor in the step, with the time (s), for bodies that moved far. In
+    /// ascending order.
     pub fn passed(&self, world: &World, dt: f32, activity: &[Activity], far: &[u32]) -> Vec<(Overlap, f32)> {
         let Self { kinds, groups, jointed, .. } = self;
         let visitors = Visitors { bodies: &world.bodies, kinds, groups, activity, jointed };
@@ -248,7 +257,7 @@ impl Detector {
                     }
                 };
                 if c.sensor {
-                    // Visitors that moved far find the sensor themselves.
+                    // Visitors that moved far find the sensor in their own search.
                     part.meet_all(&own, &self.moving, |other| {
                         if far.binary_search(&other.body).is_err() {
                             meet(other);
@@ -267,7 +276,7 @@ impl Detector {
 }
 
 impl WorldContacts {
-    /// Calls `meet` on the colliders near the way of one that are no sensors.
+    /// Calls `meet` on colliders near the path of another one, except sensors.
     fn meet_all(&self, own: &Swept, moving: &[BodyState], mut meet: impl FnMut(&ColliderInfo)) {
         let aabb = own.aabb();
         if !is_in_range(&aabb) {

@@ -1,4 +1,5 @@
-//! Vectors and rotations of sixteen pairs side by side, in the order of operations of one pair: the bits are the same.
+//! Vectors and rotations of sixteen pairs side by side. The order of operations is that of one pair, so the bits are
+//! the same.
 
 use crate::lanes::Lanes;
 pub(super) use crate::math::rotation::paired_product as product;
@@ -12,7 +13,7 @@ pub(super) struct Pose<L> {
 }
 
 impl<L: Lanes> Pose<L> {
-    /// From columns: x, y, z, w of the rotation, then the place.
+    /// From columns: x, y, z, w of the rotation, then the position.
     #[inline(always)]
     pub fn of(c: [L; 8]) -> Self {
         Self { rotation: Quat { axis: vec3(c[0], c[1], c[2]), w: c[3] }, at: vec3(c[4], c[5], c[6]) }
@@ -27,14 +28,14 @@ impl<L: Lanes> Pose<L> {
         }
     }
 
-    /// `other` as seen from `self`.
+    /// `other` in the frame of `self`.
     #[inline(always)]
     pub fn sees(self, other: Self) -> Self {
         let back = backwards(self.rotation);
         Self { at: Turn::of(back).of_vector(other.at - self.at), rotation: product(back, other.rotation) }
     }
 
-    /// The way back.
+    /// The inverse pose.
     #[inline(always)]
     pub fn inverse(self) -> Self {
         let back = backwards(self.rotation);
@@ -42,7 +43,7 @@ impl<L: Lanes> Pose<L> {
     }
 }
 
-/// A rotation as it is applied to vectors.
+/// A rotation in the form that transforms vectors.
 #[derive(Clone, Copy)]
 pub(super) struct Turn<L> {
     axis: Vec3<L>,
@@ -93,7 +94,7 @@ pub(super) fn choose<L: Lanes>(if_false: Vec3<L>, if_true: Vec3<L>, mask: L::Mas
     )
 }
 
-/// The corner of a cuboid that lies furthest in a direction.
+/// The corner of a cuboid that is furthest in a direction.
 #[inline(always)]
 pub(super) fn corner<L: Lanes>(half: Vec3<L>, direction: Vec3<L>) -> Vec3<L> {
     vec3(half.x.with_sign(direction.x), half.y.with_sign(direction.y), half.z.with_sign(direction.z))

@@ -1,4 +1,4 @@
-//! A contact manifold that lives on from step to step: at most four points, chosen and matched deterministically.
+//! A contact manifold that persists from step to step: at most four points, selected and matched deterministically.
 
 use glam::{Quat, Vec3};
 
@@ -6,7 +6,7 @@ use crate::error::{Result, input};
 use crate::math::{self, NormalMovement};
 use crate::saved::{Archive, Saved};
 
-/// Most points that a manifold keeps.
+/// Largest number of points of a manifold.
 pub const MAX_POINTS: usize = 4;
 
 /// One contact point, anchored on both bodies.
@@ -16,36 +16,36 @@ pub struct ManifoldPoint {
     pub anchor_a: Vec3,
     /// On the surface of b, in b's frame (m).
     pub anchor_b: Vec3,
-    /// From the centre of mass of a to the point midway between the surfaces, world axes (m).
+    /// From the center of mass of a to the point midway between the surfaces, world axes (m).
     pub r_a: Vec3,
-    /// From the centre of mass of b to that point (m).
+    /// From the center of mass of b to that point (m).
     pub r_b: Vec3,
-    /// Distance along the normal when the manifold was computed, negative when overlapping (m).
+    /// Distance along the normal when the manifold was computed, negative for overlap (m).
     pub separation: f32,
     /// parry's features of a and b; 0 if unknown.
     pub features: u64,
-    /// Which point of the manifold before it is the same point; none if it is new.
+    /// Index of the same point in the manifold before, or `None` if the point is new.
     pub before: Option<u8>,
 }
 
 crate::saved::fields!(ManifoldPoint { anchor_a, anchor_b, r_a, r_b, separation, features, before });
 
-/// The slot of a manifold that has none yet.
+/// The slot of a manifold that has no slot yet.
 pub const NO_SLOT: u32 = u32::MAX;
 
-/// The contact of two bodies over one pair of convex subshapes: where they touch. A manifold without points has ended.
+/// The contact of two bodies over one pair of convex subshapes. A manifold without points has ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manifold {
     /// Unit normal from a to b, world axes.
     pub normal: Vec3,
     /// Triangles or cells of composite shapes; (0, 0) for convex shapes.
     pub subshapes: (u32, u32),
-    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp (m).
+    /// Radius of curvature of a's surface at the contact, 0 if flat or sharp (m).
     pub radius_a: f32,
-    /// Radius of curvature of b's surface where it touches (m).
+    /// Radius of curvature of b's surface at the contact (m).
     pub radius_b: f32,
-    /// Where its rows are as long as it lasts, [`NO_SLOT`] until it has been given some. It goes on to the manifold that is computed
-    /// in place of this one.
+    /// The slot of its rows while it lasts, or [`NO_SLOT`] before it gets one. The manifold that replaces it keeps the
+    /// slot.
     pub slot: u32,
     points: [ManifoldPoint; MAX_POINTS],
     count: u8,
@@ -77,7 +77,7 @@ impl Manifold {
         Self { normal, subshapes, radius_a: 0.0, radius_b: 0.0, slot: NO_SLOT, points, count: count as u8 }
     }
 
-    /// Whether another has the same bits, slots and the points before apart.
+    /// Whether another manifold has the same bits, except for slots and the matches to earlier points.
     pub(super) fn is_as(&self, other: &Self) -> bool {
         let numbers = |point: &ManifoldPoint| {
             let ManifoldPoint { anchor_a, anchor_b, r_a, r_b, separation, features, before: _ } = *point;
@@ -98,7 +98,7 @@ impl Manifold {
         &self.points[..self.count as usize]
     }
 
-    /// Ends: no point is left, and the slot is free for another manifold.
+    /// Ends the manifold: it loses its points, and its slot is free for another one.
     pub(super) fn end(&mut self) {
         self.count = 0;
     }
@@ -108,7 +108,8 @@ impl Manifold {
         self.count == 0
     }
 
-    /// How the points move along the normal where the center of b goes on by `drift` as seen from that of a, and each body turns.
+    /// Displacement of the points along the normal if the center of b moves by `drift` relative to that of a, and each
+    /// body turns.
     pub(super) fn movement(&self, drift: Vec3, turns: [Quat; 2]) -> impl Fn(&ManifoldPoint) -> f32 + use<> {
         let vector = |v: Vec3| math::Vec3::<f32>::load(v.to_array());
         let [turn_a, turn_b] = turns.map(|turn| math::Quat::load(turn.to_array()));
@@ -118,20 +119,21 @@ impl Manifold {
         move |point| movement.between(vector(point.r_a), vector(point.r_b))
     }
 
-    /// Brings separations from where the surfaces meet to where the bodies begin: until they meet, the bodies move by `drift` and `turns`.
+    /// Converts separations at the time of impact to separations at the start of the step. The bodies move by `drift`
+    /// and `turns` in between.
     pub(super) fn carry_back(&mut self, drift: Vec3, turns: [Quat; 2]) {
         let movement = self.movement(drift, turns);
         self.points[..self.count as usize].iter_mut().for_each(|point| point.separation -= movement(point));
     }
 
-    /// Brings the points at least so far apart.
+    /// Raises separations to at least these values.
     pub(super) fn give_way(&mut self, least: [f32; MAX_POINTS]) {
         let points = self.points[..self.count as usize].iter_mut().zip(least);
         points.for_each(|(point, least)| point.separation = point.separation.max(least));
     }
 
-    /// Takes over the slot of the same contact one step earlier: points match by feature and, where that fails (two aligned boxes
-    /// whose offset changes sign share no feature), by nearness within `distance` (m).
+    /// Takes over the slot of the same contact one step earlier. Points match by feature. If that fails, they match by
+    /// nearness within `distance` (m): two aligned boxes share no feature after their offset changes sign.
     pub(super) fn succeed(&mut self, old: &Self, distance: f32) {
         self.slot = old.slot;
         let mut taken = [false; MAX_POINTS];
@@ -181,12 +183,12 @@ fn reduce(normal: Vec3, candidates: &[ManifoldPoint], kept: &mut [ManifoldPoint;
     let c = widest.r_a;
     let side = area(a, b, c);
     if side == 0.0 {
-        // All in a line: its ends carry everything.
+        // All lie on one line: its ends carry the whole load.
         kept[0] = deepest;
         kept[1] = furthest;
         return 2;
     }
-    // Area gained outside the triangle: beyond the edge that the point is on the far side of.
+    // Area that a point adds outside the triangle, beyond the edge that separates the point from it.
     let gain = |p: &ManifoldPoint| {
         let s = side.signum();
         let q = p.r_a;
@@ -253,7 +255,7 @@ mod tests {
     fn points_match_by_feature_then_by_position_and_never_twice() {
         let mut old = Manifold::new(Vec3::Y, (0, 0), &[point(0.0, 0.0, 0.0), point(1.0, 0.0, 0.0)]);
         old.points[0].features = 7;
-        // The first moved far but kept its feature, the second kept its place, the third is new.
+        // The first moved far but kept its feature, the second kept its position, the third is new.
         let mut moved = [point(0.5, 0.0, 0.0), point(1.001, 0.0, 0.0), point(1.002, 0.0, 0.0)];
         moved[0].features = 7;
         let mut new = Manifold::new(Vec3::Y, (0, 0), &moved);

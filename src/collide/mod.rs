@@ -1,9 +1,9 @@
-//! Collision detection: a tree over boxes, then persistent manifolds. The only module that asks parry for contacts.
+//! Collision detection: a tree over boxes, then persistent manifolds. No other module asks parry for contacts.
 //!
-//! The tree holds fattened boxes, and only a collider that left its fattened box gets another. Two colliders are a pair while their
-//! fattened boxes overlap. The pairs of a step begin in the order of their colliders, so that every later stage is deterministic for any
-//! number of threads. Each of several worlds beside each other has its own tree and pairs, so that the pairs of a world do not depend on
-//! the other worlds.
+//! The tree holds fattened boxes. A collider gets a new box only when it leaves its fattened box. Two colliders are a
+//! pair while their fattened boxes overlap. New pairs of a step are sorted by their colliders, so every later stage is
+//! deterministic for any number of threads. Several worlds beside each other have separate trees and pairs, so the
+//! pairs of a world do not depend on other worlds.
 
 mod ascent;
 mod collider;

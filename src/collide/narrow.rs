@@ -1,5 +1,6 @@
-//! The contacts of pairs, brought to where the bodies are: reused while the bodies hardly moved, else computed. Sixteen pairs at a time are
-//! tested, and those of cuboids are computed as many at a time; each pair is updated by itself, so that it does not matter with which others.
+//! Updates the contacts of pairs to the present poses. Contacts are reused while the bodies have hardly moved, else
+//! they are computed. Pairs are tested sixteen at a time, and cuboid pairs are computed sixteen at a time. Each pair is
+//! updated by itself, so the other pairs in a group do not matter.
 
 use std::cell::RefCell;
 use std::sync::Mutex;
@@ -15,7 +16,7 @@ use super::reuse::{LOST, MOVED, REUSED, ReuseTest, Tested};
 use crate::lanes::{InstructionSet, WIDTH, Wide};
 use crate::panics::blaming;
 
-/// What an update reads.
+/// Input of an update.
 pub(super) struct Narrow<'a> {
     pub colliders: &'a [ColliderInfo],
     pub cuboids: &'a [CuboidPlace],
@@ -24,12 +25,12 @@ pub(super) struct Narrow<'a> {
     pub neighbors: Neighbors<'a>,
 }
 
-/// A pair that is not as it was.
+/// A pair that changed.
 pub(super) struct Updated {
-    /// Its place.
+    /// Its index.
     pub pair: u32,
     pub computed: bool,
-    /// Whether what touches, or with how many points, is other than before.
+    /// Whether the touching subshapes or the number of points changed.
     pub reshaped: bool,
 }
 
@@ -45,20 +46,21 @@ struct Scratch {
     events: Vec<Event>,
     cuboid_pairs: Vec<CuboidPair>,
     cuboids: CuboidScratch,
-    /// The events whose contacts are held against the ways of their bodies, with the manifolds that the pairs had of those that go far.
+    /// Events whose contacts are checked against the paths of their bodies. Pairs that move far also keep their earlier
+    /// manifolds here.
     going: Vec<(u32, Going, Vec<Manifold>)>,
 }
 
-/// A pair that the test found not to stay as it is.
+/// A pair for which the test demands a change.
 struct Event {
     place: u32,
     changes: bool,
-    /// None until it is computed.
+    /// `None` until the update is computed.
     update: Option<Update>,
 }
 
 impl Narrow<'_> {
-    /// Updates some pairs; returns those that are not as they were, in their order.
+    /// Updates some pairs. Returns the changed pairs in their order.
     pub fn update(&self, chunk: PairChunk) -> Vec<Updated> {
         SCRATCH.with_borrow_mut(|scratch| self.update_with(chunk, scratch))
     }

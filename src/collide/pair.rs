@@ -1,4 +1,4 @@
-//! The contact of one pair of colliders, and how a new one takes the place of the last.
+//! The contact of one pair of colliders, and its replacement by a newer one.
 
 use glam::Vec3;
 use parry3d::math::Pose;
@@ -17,7 +17,7 @@ use crate::world::{Body, BodyKind, World, placed, seen_from};
 /// Two colliders whose boxes overlap.
 #[derive(Debug)]
 pub struct Pair {
-    /// The body with the collider that reaches further.
+    /// The body whose collider has the larger reach.
     pub body_a: u32,
     /// The other body.
     pub body_b: u32,
@@ -25,13 +25,13 @@ pub struct Pair {
     pub manifolds: Vec<Manifold>,
     pub(super) collider_a: u32,
     pub(super) collider_b: u32,
-    /// The colliders, by their indices among those of their bodies.
+    /// The colliders, by index on their bodies.
     pub colliders: [u32; 2],
     /// Half of the smallest side of the thinner one (m).
     pub size: f32,
-    /// Whether a body of it is awake, so that its manifolds are swept.
+    /// Whether one of its bodies is awake, so that the sweeps solve its manifolds.
     pub takes_part: bool,
-    /// Whether what lies flush with one of the colliders changed its manifold.
+    /// Whether a shape that lies flush with one of the colliders changed its manifold.
     pub(super) is_mended: bool,
 }
 
@@ -47,7 +47,7 @@ crate::saved::cloned!(Pair {
     is_mended
 });
 
-/// A collider, and where its body is.
+/// A collider and the state of its body.
 pub(super) type Side<'a> = (&'a ColliderInfo, &'a BodyState);
 
 /// Memory that one thread reuses from pair to pair.
@@ -60,19 +60,19 @@ pub(super) struct PairScratch {
     renewal: Renewal,
 }
 
-/// The same for manifolds that take the place of others.
+/// The same for manifolds that replace others.
 #[derive(Default)]
 struct Renewal {
     candidates: Vec<ManifoldPoint>,
     old: Vec<Manifold>,
 }
 
-/// How a pair was brought up to date.
+/// The result of an update of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Update {
     Reused,
     Computed,
-    /// Computed, to another number of manifolds or points.
+    /// Computed, with another number of manifolds or points.
     Reshaped,
 }
 
@@ -92,24 +92,27 @@ impl Pair {
         }
     }
 
-    /// In which order pairs choose their colors; the lower half is left to the manifolds of the pair. It says nothing of where the pair
-    /// is, and is the same in every copy of its world. Pairs that are colored in the order of the bodies color rows of bricks alike: sweeps push a
-    /// whole row the same way one after another, and a wall of 400 bricks rattled at 23 mm/s that otherwise rests at 0.2.
+    /// The order in which pairs choose their colors. The lower half of the number is free for the manifolds of the
+    /// pair. The rank does not depend on where the pair is, and is the same in every copy of its world. If pairs chose
+    /// colors in the order of bodies, rows of bricks would get the same colors. Sweeps would then push a whole row the
+    /// same way, one brick after another: a wall of 400 bricks rattled at 23 mm/s, and rests at 0.2 mm/s with this
+    /// rank.
     pub fn rank(&self) -> u64 {
         let both = u64::from(self.collider_a) << 32 | u64::from(self.collider_b);
         mixed(both) >> 32 << 32
     }
 
-    /// Whether the bodies touch, or are about to.
+    /// Whether the bodies touch or are about to touch.
     pub fn is_touching(&self) -> bool {
         self.manifolds.iter().any(|manifold| !manifold.has_ended())
     }
 
-    /// The points of a manifold of this pair where the bodies of `world` are: how deep the surfaces overlap (m), and how fast they part (m/s).
+    /// For each point of a manifold of this pair, at the poses in `world`: the overlap of the surfaces (m) and their
+    /// separation speed (m/s).
     pub fn overlaps<'a>(&self, manifold: &'a Manifold, world: &'a World) -> impl Iterator<Item = (f32, f32)> + 'a {
         let [a, b] = [self.body_a, self.body_b].map(|body| &world.bodies[body as usize]);
         let at = |body: &Body, anchor: Vec3| body.position + body.rotation * anchor;
-        // A body that became fixed keeps the numbers of its velocity, and they mean nothing.
+        // A body that became fixed keeps velocity values that have no meaning.
         let velocity =
             |body: &Body, p: Vec3| if body.kind == BodyKind::Fixed { Vec3::ZERO } else { body.velocity_at(p) };
         manifold.points().iter().map(move |point| {
@@ -119,7 +122,7 @@ impl Pair {
         })
     }
 
-    /// Ends all manifolds. A body that left the range touches nothing, so that the trouble does not spread.
+    /// Ends all manifolds. A body that left the range touches nothing, so that invalid numbers do not spread.
     pub(super) fn end(&mut self) {
         self.manifolds.retain(|manifold| manifold.slot != NO_SLOT);
         self.manifolds.iter_mut().for_each(Manifold::end);
@@ -165,7 +168,7 @@ impl Pair {
         self.renew(found, sides, prediction, renewal)
     }
 
-    /// Takes over the manifold that `write` writes.
+    /// Takes over the manifold that `write` returns.
     pub(super) fn take_over(
         &mut self,
         sides: [Side; 2],
@@ -182,7 +185,7 @@ impl Pair {
         self.renew(std::slice::from_ref(one), sides, prediction, renewal)
     }
 
-    /// Puts the manifolds `found` in the place of those that are.
+    /// Replaces the present manifolds by `found`.
     fn renew(
         &mut self,
         found: &[ParryManifold],
@@ -195,7 +198,7 @@ impl Pair {
         let before = self.manifolds.len();
         old.clear();
         old.append(&mut self.manifolds);
-        // Most pairs have one manifold; by itself a vector would begin with room for four, a kilobyte too much.
+        // Most pairs have one manifold. The default growth of a vector would allocate four, which wastes a kilobyte.
         self.manifolds.reserve_exact(found.len());
         for m in found {
             candidates.clear();
@@ -204,7 +207,7 @@ impl Pair {
                 continue;
             }
             let normal_a = m.subshape_pos1().map_or(m.local_n1, |pose| pose.rotation * m.local_n1);
-            // Coincident centres leave no direction: up is as good as any, and finite.
+            // Coincident centers give no direction. Up is finite, and as good as any other.
             let normal = (pose_a.rotation * normal_a).try_normalize().unwrap_or(Vec3::Y);
             let mut manifold = Manifold::new(normal, (m.subshape1, m.subshape2), candidates);
             manifold.radius_a = curvature(ca, pose_a.rotation.inverse() * normal);
@@ -227,12 +230,12 @@ impl Pair {
     }
 }
 
-/// Where a collider is.
+/// The pose of a collider.
 pub(super) fn pose((c, body): Side) -> Pose {
     placed(Pose::from_parts(body.position, body.rotation), c.local)
 }
 
-/// A point of parry's as one of ours; none if it is not finite or too far away.
+/// Converts one of parry's points. Returns `None` if it is not finite or too far away.
 fn candidate(
     m: &ParryManifold,
     p: &TrackedContact<()>,
@@ -245,7 +248,7 @@ fn candidate(
     let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);
     let p2 = m.subshape_pos2().map_or(p.local_p2, |pose| pose * p.local_p2);
     let (anchor_a, anchor_b) = (ca.local * p1, cb.local * p2);
-    // Arms to the point midway between the surfaces; differences of centres first, which are small.
+    // Arms to the point midway between the surfaces. Subtract the centers first: the differences are small.
     let on_a = a.rotation * anchor_a - (a.center - a.position);
     let on_b = b.rotation * anchor_b - (b.center - b.position);
     let half_gap = 0.5 * ((b.center - a.center) + on_b - on_a);
@@ -261,7 +264,8 @@ fn candidate(
     })
 }
 
-/// Radius of the ball, or of the side of the cylinder, that a shape touches with along `normal` (its own frame) (m).
+/// Radius of the surface that a shape touches with along `normal`, in its own frame (m): that of a ball, or of the side
+/// of a cylinder.
 fn curvature(c: &ColliderInfo, normal: Vec3) -> f32 {
     if c.cuboid.is_some() {
         return 0.0;

@@ -1,4 +1,5 @@
-//! The pairs of one world, and apart from them what the test whether they are reused reads: a third of the bytes, and no manifold.
+//! The pairs of one world, and a separate array with the data of the reuse test: a third of the bytes, and no
+//! manifolds.
 
 use std::ops::{Deref, DerefMut};
 
@@ -8,7 +9,7 @@ use rayon::prelude::*;
 use super::collider::{BodyState, ColliderInfo};
 use super::pair::Pair;
 
-/// Where a body is.
+/// The pose of a body.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Placed {
@@ -27,15 +28,15 @@ impl Placed {
     }
 }
 
-/// What the test reads of a pair: three rows of eight numbers, so that lanes can gather them.
+/// Data of a pair for the reuse test: three rows of eight numbers, so that lanes can gather them.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct Track {
     /// Half of the smallest side of the thinner collider (m).
     pub size: f32,
-    /// Radius around the origin of body b that holds its collider (m).
+    /// Radius around the origin of body b that contains its collider (m).
     pub reach_b: f32,
-    /// Distance up to which the last computation predicted (m); that of a pair that was never computed is below all others.
+    /// Largest distance of the last prediction (m). For a pair that was never computed it is below every other value.
     pub predicted: f32,
     /// 1 if collider a is unbounded, otherwise 0.
     pub unbounded: f32,
@@ -43,7 +44,7 @@ pub(super) struct Track {
     pub takes_part: f32,
     pub rest: f32,
     pub bodies: [u32; 2],
-    /// Where the bodies were when the manifolds were computed.
+    /// The poses of the bodies when the manifolds were computed.
     pub then: [Placed; 2],
 }
 
@@ -66,7 +67,7 @@ impl Track {
     }
 }
 
-/// Pairs, in the order in which they were found.
+/// Pairs, in the order of discovery.
 #[derive(Default)]
 pub(super) struct Pairs {
     all: Vec<Pair>,
@@ -75,19 +76,19 @@ pub(super) struct Pairs {
 
 crate::saved::cloned!(Pairs { all, tracks });
 
-/// Some pairs one after another.
+/// A contiguous part of the pairs.
 pub(super) struct PairChunk<'a> {
-    /// The place of the first among all.
+    /// The index of the first one among all pairs.
     pub first: u32,
     pub pairs: &'a mut [Pair],
     pub tracks: &'a mut [Track],
 }
 
-/// Pairs that one task updates: those of them that are computed fill several groups of lanes.
+/// Number of pairs for one task. The computed pairs among them fill several groups of lanes.
 const PAIRS_A_TASK: usize = 2048;
 
 impl Pairs {
-    /// Begins pairs of two colliders each, the further reaching first.
+    /// Adds pairs of two colliders each. The collider with the larger reach comes first.
     pub fn begin(&mut self, found: &[(u32, u32)], colliders: &[ColliderInfo]) {
         let begin = |&(i, j): &(u32, u32)| {
             let swap = colliders[j as usize].reach > colliders[i as usize].reach;
@@ -100,12 +101,12 @@ impl Pairs {
         self.tracks.par_extend(new.map(|pair| Track::of(pair, colliders)));
     }
 
-    /// Pairs, and what the tests of them read.
+    /// Pairs with their test data.
     pub fn of((all, tracks): (Vec<Pair>, Vec<Track>)) -> Self {
         Self { all, tracks }
     }
 
-    /// A pair and what the test of it reads.
+    /// A pair and its test data.
     pub fn with_track(&self, place: usize) -> (&Pair, &Track) {
         (&self.all[place], &self.tracks[place])
     }
@@ -115,7 +116,7 @@ impl Pairs {
         (&mut self.all[place], &mut self.tracks[place])
     }
 
-    /// What the tests of all read.
+    /// The test data of all pairs.
     pub fn tracks(&self) -> &[Track] {
         &self.tracks
     }
@@ -125,24 +126,25 @@ impl Pairs {
         &mut self.tracks
     }
 
-    /// Ends a pair; the last takes its place.
+    /// Ends a pair. The last pair takes its index.
     pub fn swap_remove(&mut self, place: usize) -> Pair {
         self.tracks.swap_remove(place);
         self.all.swap_remove(place)
     }
 
-    /// Ends the contacts of a pair, which is computed anew.
+    /// Ends the contacts of a pair. The next detection computes it again.
     pub fn end(&mut self, place: usize) {
         self.all[place].end();
         self.tracks[place].predicted = NEVER;
     }
 
-    /// Radius around the origin of body b of a pair that holds its collider (m).
+    /// Radius around the origin of body b of a pair that contains its collider (m).
     pub fn reach_b(&self, place: usize) -> f32 {
         self.tracks[place].reach_b
     }
 
-    /// Where the bodies of a pair were when its manifolds were computed; none if they never were, or a body is out of range.
+    /// The poses of the bodies of a pair when its manifolds were computed. Returns `None` if they never were, or if a
+    /// body is out of range.
     pub fn computed_at(&self, place: usize) -> Option<&[Placed; 2]> {
         let track = &self.tracks[place];
         (track.predicted != NEVER).then_some(&track.then)

@@ -1,7 +1,8 @@
-//! The contacts of a step along the ways that the bodies take in it.
+//! The contacts of a step along the paths of the bodies.
 //!
-//! A contact that is seen before its surfaces meet stops what would cross its plane within the step. Where the bodies go on far, the plane is not
-//! where the surfaces are: it would hold up what passes by, and miss what lies behind it. For such pairs the time is sought at which they meet.
+//! A speculative contact stops every crossing of its plane within the step. If the bodies move far, the surfaces are no
+//! longer at that plane: the contact would hold bodies that pass by, and miss bodies behind it. For such pairs this
+//! module searches for the time of impact.
 
 use glam::Vec3;
 
@@ -14,42 +15,44 @@ use super::pairs::Track;
 use super::sweep::{Station, Swept, Until, Way, impact, overlap_at_end};
 use crate::lanes::InstructionSet;
 
-/// How far bodies approach in a step before their contact is that of the time at which they meet, relative to the smallest half extent of the
+/// Approach in a step from which the contact is that of the time of impact, relative to the smallest half extent of the
 /// thinner shape.
 const FAR: f32 = 0.5;
-/// The turn up to which a half-space is seen as far ahead as a body gets (rad).
+/// Largest rotation of a body in a step for which contacts with a half-space are predicted over the body's whole path
+/// (rad).
 const MOST_TURN: f32 = 0.5;
-/// How fast the spin of a body that nothing touches may change, over the square of the spin: the moments of inertia about two axes differ by no more than
-/// the third, so that none of the three equations of Euler has a factor above 1.
+/// Bound of the angular acceleration of a free body, divided by the square of its spin. The moments of inertia about
+/// two axes differ by no more than the third moment, so no coefficient in Euler's three equations exceeds 1.
 const SWERVE: f32 = 0.58;
-/// The gap up to which surfaces touch, relative to the same.
+/// Gap up to which surfaces touch, relative to the same.
 const TOUCHING: f32 = 2e-3;
 
-/// The distance up to which a pair was predicted that its next step computes anew in any case.
+/// The predicted distance of a pair that the next step computes in any case.
 pub(super) const ANEW: f32 = 0.0;
 
-/// How a pair goes on in the step.
+/// The motion of a pair in the step.
 #[derive(Clone, Copy)]
 pub(super) struct Going {
-    /// How far its bodies may approach (m).
+    /// Upper bound of the approach of its bodies (m).
     approach: f32,
     size: f32,
 }
 
 impl Going {
-    /// Whether the bodies may get so far that the contact is that of the time at which they meet.
+    /// Whether the bodies can move so far that the contact is that of the time of impact.
     pub fn is_far(self) -> bool {
         self.approach > FAR * self.size
     }
 
-    /// Whether contacts are sought as far as the bodies approach.
+    /// Whether the prediction covers the whole approach.
     fn is_seen(self) -> bool {
         self.approach <= 2.0 * self.size
     }
 }
 
 impl Narrow<'_> {
-    /// How a pair goes on whose contacts may act though its bodies do not touch: those have to be held against the ways of the bodies.
+    /// The motion of a pair whose contacts can act although its bodies do not touch. Those contacts have to be checked
+    /// against the paths of the bodies.
     pub(super) fn going(&self, track: &Track) -> Option<Going> {
         let [a, b] = track.bodies.map(|body| &self.moving[body as usize]);
         let (dt, size) = (self.margins.dt, track.size);
@@ -57,13 +60,14 @@ impl Narrow<'_> {
         let approach = dt * (shift.length() + track.reach_b * (b.w - a.w).length());
         let turn = dt * (a.w.length() + b.w.length());
         let goes = approach > TOUCHING * size && approach < FARTHEST && (track.unbounded == 0.0 || turn > 0.0);
-        // A half-space is where its contact is, however far off.
+        // The plane of a half-space contact is valid at any distance.
         let is_near = track.unbounded != 0.0 && turn <= MOST_TURN;
         goes.then_some(Going { approach: if is_near { 0.0 } else { approach }, size })
     }
 
-    /// Brings the contacts of a pair to the ways of its bodies. Where the bodies meet far off, the contact is that of there; `before` are those that the
-    /// pair had before it was computed. Where they do not meet, no contact acts. None if the contacts stay about as they were computed.
+    /// Adapts the contacts of a pair to the paths of its bodies. If the bodies meet far away, the contact is the one at
+    /// that place; `before` are the contacts of the pair before it was computed. If they do not meet, no contact acts.
+    /// Returns `None` if the contacts stay about as they were computed.
     pub(super) fn follow_ways(
         &self,
         pair: &mut Pair,
@@ -80,14 +84,14 @@ impl Narrow<'_> {
         let within = |time: f32| pair.manifolds.iter().any(|manifold| self.may_act(manifold, bodies, time));
         let step = self.margins.dt + self.margins.substep;
         if going.is_seen() && !within(step) {
-            // A contact that is reused is held against no ways.
+            // A reused contact is not checked against paths.
             let reused = self.margins.recycle * size / going.approach;
             if within(step + self.margins.dt * reused) {
                 track.predicted = ANEW;
             }
             return None;
         }
-        // The last substep leaves velocities that the next one may go on with.
+        // The next substep can start from the velocities that the last substep leaves.
         let ways = bodies.map(|body| Way::free(body, step));
         let [a, b] = [(0, pair.collider_a), (1, pair.collider_b)]
             .map(|(side, c)| Swept::new(&self.colliders[c as usize], bodies[side], &ways[side]));
@@ -99,7 +103,7 @@ impl Narrow<'_> {
             return None;
         }
         let met = impact(a, b, size, Until::Meet, true);
-        // Joints, and others in a heap, hold a body off its free way.
+        // Joints, and neighbors in a heap, hold a body off its free path.
         let is_led =
             || bodies.iter().any(|body| body.tied == 1.0) || bodies.iter().all(|body| body.gravity_scale > 0.0);
         let stays = |time: f32| going.is_seen() && (!going.is_far() || is_led() || self.is_held_up(pair, &ways, time));
@@ -142,7 +146,8 @@ impl Narrow<'_> {
         Some(update)
     }
 
-    /// Whether a body of a pair meets something fixed on its way before a time: it does not get to where it would meet the other one.
+    /// Whether a body of a pair meets fixed geometry before a time. Then it does not reach the place where it would
+    /// meet the other body.
     fn is_held_up(&self, pair: &Pair, ways: &[Way; 2], time: f32) -> bool {
         let is_earlier = |side: usize| {
             let c = &self.colliders[[pair.collider_a, pair.collider_b][side] as usize];
@@ -179,10 +184,11 @@ impl Narrow<'_> {
         is_earlier(0) || is_earlier(1)
     }
 
-    /// Whether the bodies may cross the plane of a contact within a time.
+    /// Whether the bodies can cross the plane of a contact within a time.
     fn may_act(&self, manifold: &Manifold, [a, b]: [&BodyState; 2], time: f32) -> bool {
         let shift = |body: &BodyState, arm: Vec3| time * (body.v + 0.5 * time * body.pull + body.w.cross(arm));
-        // An arm that turns goes straight but for a half of this, and about an axis that stays but for less than the other.
+        // The first bounds the deviation of a turning arm from a straight line. The second bounds the deviation from a
+        // rotation about a constant axis.
         let bend = |body: &BodyState, arm: Vec3| time * time * body.w.length_squared() * arm.length();
         manifold.points().iter().any(|point| {
             let along = (shift(b, point.r_b) - shift(a, point.r_a)).dot(manifold.normal);
@@ -190,13 +196,14 @@ impl Narrow<'_> {
         })
     }
 
-    /// The least separations of the points of a contact with which it does not act where its bodies go on freely, and come no nearer than `gap`.
+    /// The smallest separations of the points at which a contact does not act while the bodies move freely and stay at
+    /// least `gap` apart.
     fn free_separations(&self, manifold: &Manifold, [a, b]: [&BodyState; 2], gap: f32) -> [f32; MAX_POINTS] {
         let substep = self.margins.substep;
         let count = (self.margins.dt / substep).round() as u32;
         let (v, pull, normal) = (b.v - a.v, b.pull - a.pull, manifold.normal);
         let mut least = [f32::NEG_INFINITY; MAX_POINTS];
-        // The velocities that the last substep leaves are held against the next one.
+        // The velocities after the last substep are checked against the next substep.
         for k in 0..=count {
             let (then, next) = (k as f32 * substep, (k + 1) as f32 * substep);
             let drift = then * (v + 0.5 * next * pull);

@@ -1,4 +1,4 @@
-//! The colliders of a world where they are now, for queries.
+//! The colliders of a world at their present poses, for queries.
 
 use glam::Vec4;
 use parry3d::bounding_volume::Aabb;
@@ -9,7 +9,7 @@ use super::collider::{is_in_range, is_placed};
 use super::tree::{NOWHERE, Tree};
 use crate::world::{Collider, MOST_LENGTH, World, placed, pose};
 
-/// A collider by its body and its index there.
+/// A collider: its body, and its index there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Place {
     pub body: u32,
@@ -17,7 +17,8 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// The collider, with its pose in the world; none if it is gone, or farther away than [`MOST_LENGTH`].
+    /// The collider and its pose in the world. Returns `None` if it was removed, or is farther away than
+    /// [`MOST_LENGTH`].
     pub fn find(self, world: &World) -> Option<(&Collider, Pose)> {
         let body = world.bodies.get(self.body as usize)?;
         let collider = body.colliders.get(self.collider as usize)?;
@@ -26,7 +27,7 @@ impl Place {
     }
 }
 
-/// Colliders as the tree of a detection has them, with their boxes there.
+/// Colliders with their boxes in the tree of a detection.
 pub(super) struct Standing<'a> {
     pub tree: &'a Tree,
     pub places: Vec<Place>,
@@ -37,13 +38,13 @@ pub(super) struct Standing<'a> {
 pub(crate) struct Places {
     tree: Tree,
     places: Vec<Place>,
-    /// The half-spaces, which have no box, ascending.
+    /// The half-spaces, which have no box, in ascending order.
     pub planes: Vec<Place>,
 }
 
 impl Places {
-    /// The colliders of each of the worlds. `standing` gives those of a world that a tree stands over, and `count` how many of a body are
-    /// among them, from the first.
+    /// The colliders of each world. `standing` returns those of a world that has a tree, and `count` returns how many
+    /// colliders of a body are among them, from the first.
     pub(super) fn of<'a>(
         world: &World,
         count: impl Fn(usize) -> usize,
@@ -58,7 +59,7 @@ impl Places {
         places.collect()
     }
 
-    /// The colliders of each of the worlds, arranged anew.
+    /// The colliders of each world, in a new tree.
     pub fn of_world(world: &World) -> Vec<Self> {
         Self::of(world, |_| 0, |_| None)
     }
@@ -89,7 +90,7 @@ impl Places {
         Self { tree, places, planes }
     }
 
-    /// Visits the colliders that have a box as [`Tree::nearest`] does.
+    /// Visits the colliders that have a box, like [`Tree::nearest`].
     pub fn nearest(
         &self,
         limit: f32,

@@ -1,4 +1,5 @@
-//! parry's answer for one pair of convex shapes, and a second opinion where the first is known to go wrong.
+//! Parry's result for one pair of convex shapes, and a second computation for cases in which parry is known to be
+//! wrong.
 
 use glam::Vec3;
 use parry3d::math::Pose;
@@ -9,23 +10,23 @@ use super::ascent::ascend;
 use super::facet::half_space_contact;
 use super::solid::{ClipBuffers, ContactQuery, DEEP, EXACT, PUSH, ParryManifold, Solid, add_above, ask, clip_to};
 
-/// How far a distance may be from that along its normal, relative to the thinner shape's smallest half extent.
+/// Largest error of a distance along its normal, relative to the smallest half extent of the thinner shape.
 pub(super) const TRUE: f32 = 0.01;
-/// The same where a rim touches.
+/// The same for contacts at a rim.
 const RIM: f32 = 0.004;
-/// How far apart solids with a rim are pushed, relative to the thinner shape's smallest half extent.
+/// Distance by which solids with a rim are pushed apart, relative to the smallest half extent of the thinner shape.
 const APART: f32 = 0.1;
-/// Cosine of the angle up to which two directions are the same, short of 1: 0.6 degrees.
+/// One minus the cosine of the angle up to which two directions are equal: 0.6 degrees.
 const SAME: f32 = 5e-5;
 
-/// Finds the contact of two convex shapes up to the distance `prediction`; b's pose is `pos12` as seen from a.
+/// Finds the contact of two convex shapes up to the distance `prediction`. `pos12` is the pose of b in the frame of a.
 ///
-/// Hulls that touch exactly, as the stones of an arch do, leave parry's search without a direction, and it can answer with
-/// any: overlaps of a meter between stones that only touch. A cone that lies on a cuboid may get the direction to the cuboid's
-/// other side. An answer that is deep, or other than the distance along its own normal, which has a closed form, is therefore
-/// compared with two more: that with the shapes pushed a little apart, along the line of their middles, and that across the
-/// best face of either shape. No direction gives more than the true distance: what gives most is taken. The contacts of two
-/// cuboids come from [`cuboids`](super::cuboids).
+/// For hulls that touch exactly, like the stones of an arch, parry's search has no direction and can return any:
+/// overlaps of a meter between stones that only touch. A cone on a cuboid can get the direction to the cuboid's other
+/// side. The distance along a normal has a closed form. If a result is deep, or differs from the distance along its own
+/// normal, it is compared with two more results: one with the shapes pushed a little apart along the line of their
+/// middles, and one across the best face of either shape. No direction gives more than the true distance, so the
+/// largest distance wins. The contacts of two cuboids come from [`cuboids`](super::cuboids).
 pub(super) fn convex_contact(
     (a, b): (&SharedShape, &SharedShape),
     pos12: &Pose,
@@ -53,13 +54,13 @@ pub(super) fn convex_contact(
     };
     let mut best = along(found.local_n1);
     let mut found_is_true = is_true(&found, best);
-    // parry's other points of a round rim may be those of its far side.
+    // Parry's other points of a round rim can lie on its far side.
     let is_round = |shape: &SharedShape| shape.as_cone().is_some() || shape.as_cylinder().is_some();
     let rims = is_round(a) || is_round(b);
     if found_is_true && best > -DEEP * size && (found.points.is_empty() || !rims) {
         return found;
     }
-    // Where the points are wrong, others along as good a direction are better.
+    // If the points are wrong, other points along an equally good direction are better.
     let is_better =
         |distance: f32, best: f32, is_true: bool| distance > best + if is_true { PUSH } else { -TRUE } * size;
     let ask_apart = |away: Vec3, push: f32| {
@@ -86,7 +87,7 @@ pub(super) fn convex_contact(
     let mut across = None;
     let mut consider = |d: Vec3, of_b: bool| {
         let distance = along(d);
-        // Of several faces, one across which the solids are as far apart as across any.
+        // Prefer a face, if the solids are as far apart across it as across any direction.
         let slack = if across.is_none() { TRUE } else { EXACT } * size;
         let is_same = rims && d.dot(found.local_n1) > 1.0 - SAME && distance > best - slack;
         if is_same || is_better(distance, best, found_is_true) {
@@ -114,13 +115,13 @@ pub(super) fn convex_contact(
     if !rims {
         return found;
     }
-    // parry's search stops short on rims.
+    // Parry's search stops too early on rims.
     let (distance, d) = ascend(found.local_n1.normalize_or(Vec3::Y), EXACT * size, gap);
     let is_as_far = |found: &ParryManifold| (deepest(found) - distance).abs() < RIM * size;
     if distance > prediction {
         found.points.clear();
     } else if !is_as_far(&found) {
-        // Far enough apart, the search is exact.
+        // If the solids are far enough apart, the search is exact.
         let apart = ask_apart(d, APART * size - distance.min(0.0));
         let is_true = is_as_far(&apart);
         found = if is_true { apart } else { point_contact([&solid_a, &solid_b], d, distance, &apart, RIM * size) };
@@ -128,8 +129,8 @@ pub(super) fn convex_contact(
     found
 }
 
-/// The contact of two solids at one point, with their distance along the unit normal `d`: the nearest point of `found`, if it has any. The frame
-/// of the first is that of both.
+/// The contact of two solids at one point, with their distance along the unit normal `d`: the nearest point of `found`,
+/// if it has points. Both solids are in the frame of the first.
 fn point_contact([a, b]: [&Solid; 2], d: Vec3, distance: f32, found: &ParryManifold, exact: f32) -> ParryManifold {
     let nearest = found.points.iter().min_by(|p, q| p.dist.total_cmp(&q.dist)).map(|point| point.local_p1);
     let top = a.furthest(d) + d * a.radius;
@@ -144,15 +145,16 @@ fn point_contact([a, b]: [&Solid; 2], d: Vec3, distance: f32, found: &ParryManif
     contact
 }
 
-/// Makes a manifold as good as new, but for the memory of its points. parry's own `clear` leaves the normal, from which its search
-/// then starts: the contact of one pair would depend on the pair before it, and so on the number of threads.
+/// Resets a manifold but keeps the memory of its points. Parry's own `clear` leaves the normal, and the next search
+/// starts from it. The contact of one pair would then depend on the pair before it, and so on the number of threads.
 pub(super) fn empty(manifold: &mut ParryManifold) {
     let mut points = std::mem::take(&mut manifold.points);
     points.clear();
     *manifold = ParryManifold { points, ..ParryManifold::new() };
 }
 
-/// The contact of `other` across the face of `solid` with the unit normal `face`; without points if the other lies beside it.
+/// The contact of `other` across the face of `solid` with the unit normal `face`; without points if `other` lies beside
+/// the face.
 fn face_contact(
     solid: &Solid,
     other: &Solid,
@@ -176,8 +178,8 @@ fn face_contact(
     found
 }
 
-/// The contact of `other` with `solid`, whose frame is that of both, along the unit normal `normal`. Where the normal is not that of a
-/// face, the solid has a corner or an edge there.
+/// The contact of `other` with `solid` along the unit normal `normal`, both in the frame of `solid`. If the normal is
+/// not a face normal, the solid has a corner or an edge there.
 pub(super) fn flush_contact(
     solid: &Solid,
     other: &Solid,
@@ -186,7 +188,7 @@ pub(super) fn flush_contact(
     ClipBuffers { polygon, patch, unclipped, corners }: &mut ClipBuffers,
     found: &mut ParryManifold,
 ) {
-    // A little wider, so that what lies just between two shapes lies on one of them.
+    // Widen it a little, so that a point just between two shapes lies on one of them.
     let exact = EXACT * search.size;
     other.feature(-normal, polygon);
     if is_face {
@@ -252,11 +254,11 @@ mod tests {
                 worst = worst.max(-depth);
             }
         }
-        // As exact as parry is for shapes a little apart.
+        // Parry has about this error for shapes that are a little apart.
         assert!(worst < 1e-3, "{worst} m of overlap between stones that only touch");
     }
 
-    /// The scratch of a thread goes from pair to pair, and which pair comes before depends on the number of threads.
+    /// A thread reuses its scratch memory for pair after pair. The pair before depends on the number of threads.
     #[test]
     fn an_answer_does_not_depend_on_the_pair_before_it() {
         let width = std::f32::consts::PI / 17.0;

@@ -1,14 +1,14 @@
-//! The report of a detection about pairs.
+//! The changes and counts that a detection reports.
 
 use super::pair::Pair;
 
-/// One thing that a detection changed.
+/// One change of a detection.
 pub(crate) enum Change<'a> {
-    /// A pair with a manifold in this slot came apart.
+    /// The pair with a manifold in this slot came apart.
     Ended(u32),
-    /// A pair is new or in another place, takes part or no longer takes part, or its manifolds were computed.
+    /// A pair is new or moved, starts or stops taking part, or its manifolds were computed.
     Pair {
-        /// Its world, and its place there.
+        /// Its world, and its index there.
         place: [u32; 2],
         pair: &'a mut Pair,
         /// Whether its manifolds were computed.
@@ -20,16 +20,16 @@ pub(crate) enum Change<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct DetectStats {
-    /// Pairs whose boxes overlap.
+    /// Number of pairs whose boxes overlap.
     pub pairs: usize,
-    /// Pairs whose manifolds were computed; the others were reused.
+    /// Number of pairs whose manifolds were computed; the others were reused.
     pub computed: usize,
-    /// Whether what touches, or with how many points, is other than before.
+    /// Whether the touching subshapes or the number of points changed.
     pub reshaped: bool,
 }
 
 impl DetectStats {
-    /// Both together.
+    /// The sum of both.
     pub(super) fn and(self, other: Self) -> Self {
         Self {
             pairs: self.pairs + other.pairs,

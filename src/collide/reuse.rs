@@ -1,4 +1,5 @@
-//! The test whether pairs are reused, sixteen at a time: the bodies hardly moved since their manifolds were computed.
+//! Tests sixteen pairs at a time whether their manifolds can be reused: if the bodies hardly moved since they were
+//! computed.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -9,36 +10,37 @@ use super::pairs::Track;
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Quat, dot3, vec3};
 
-/// Square of the sine of half the angle that either body of a reused manifold may have turned: 0.03 rad. Normals stay as they were
-/// computed, so this is how far bodies that turn together may see gravity from the wrong side. At 0.01 rad arches that open a little
-/// are computed anew while they do, and one of 17 stones, 0.12 of its radius thick, falls with 8 substeps.
+/// Squared sine of half the largest rotation of either body of a reused manifold: 0.03 rad. Normals stay as computed,
+/// so bodies that turn together can see gravity at an angle up to this. At 0.01 rad, an arch that opens a little is
+/// computed again during that motion, and one of 17 stones, 0.12 of its radius thick, falls with 8 substeps.
 const RECYCLE_TURN: f32 = 2.25e-4;
 
-/// The same where one of them is kinematic, and turns on and on: 0.002 rad. At 0.1 rad a block on a board that tilted slowly
-/// slipped 1.6 degrees late, and a ball lost a quarter of its way.
+/// The same if one body is kinematic and keeps turning: 0.002 rad. At 0.1 rad a block on a slowly tilting board slipped
+/// 1.6 degrees late, and a ball lost a quarter of its path.
 const RECYCLE_TURN_KINEMATIC: f32 = 1e-6;
 
-/// Largest turn of a body in a step with which planes are seen as far ahead as the body gets (rad). The rod of 1000 rad/s (H7) turns by 17.
+/// Largest rotation of a body in a step for which contacts with planes are predicted over the body's whole path (rad).
+/// The rod at 1000 rad/s (H7) turns by 17 rad.
 const MOST_FORESEEN_TURN: f32 = 0.5;
 
-/// What the test says of sixteen pairs.
+/// Results of the test for sixteen pairs.
 #[derive(Clone, Copy, Default, PartialEq)]
 pub(super) struct Tested {
-    /// One of the three numbers below.
+    /// One of the three values below.
     pub verdict: Wide,
-    /// Whether the pair takes part from now on or no longer does.
+    /// Whether the pair starts or stops taking part.
     pub changes: Wide,
     pub prediction: Wide,
 }
 
 /// The manifolds stay as they are.
 pub(super) const REUSED: f32 = 0.0;
-/// They are to be computed.
+/// The manifolds have to be computed.
 pub(super) const MOVED: f32 = 1.0;
-/// A body is where nothing can be computed.
+/// A body is out of range for computation.
 pub(super) const LOST: f32 = 2.0;
 
-/// Tests which pairs are reused, and notes how the bodies of those moved.
+/// Tests which pairs are reused, and records the motion of their bodies.
 pub(super) struct ReuseTest<'a> {
     pub tracks: &'a [Track],
     pub moving: &'a [BodyState],
@@ -64,7 +66,7 @@ impl Work for ReuseTest<'_> {
 }
 
 impl ReuseTest<'_> {
-    /// The verdict on sixteen pairs.
+    /// The verdicts on sixteen pairs.
     #[inline(always)]
     fn test<L: Lanes>(&self, which: &[u32; WIDTH], bodies: &[[u32; WIDTH]; 2]) -> Tested {
         let (zero, one, two) = (L::constant(0.0), L::constant(1.0), L::constant(2.0));
@@ -86,14 +88,15 @@ impl ReuseTest<'_> {
         let w = w_b - vec3(v_a[3], v_a[4], v_a[5]);
         let approach = length(v) + reach_b * length(w);
         let base = number(f64::from(self.margins.speculative)) * size + number(f64::from(self.margins.fall));
-        // A contact with a plane is true however far away it is seen; with others it would stop what passes by. Arms stay the same within a step.
+        // A contact with a plane is valid at any distance. Other far contacts would stop bodies that pass by. Arms stay
+        // the same within a step.
         let is_far_seen = L::and(unbounded.gt(zero), number(f64::from(MOST_FORESEEN_TURN)).gt(length(w_b) * dt));
         let farthest = L::select(two * size, number(f64::from(f32::MAX)), is_far_seen);
         let prediction = base + L::smaller(approach * dt, farthest);
 
         let (turn_a, turn_b) =
             (turn_since(now_a.rotation, then_a.rotation), turn_since(now_b.rotation, then_b.rotation));
-        // How far any point of b that can touch moved as seen from a. 2 |vector part| is the angle, if small.
+        // Displacement of any touching point of b relative to a. 2 |vector part| is the angle, if small.
         let carried = then_b.at - then_a.at;
         let apart = now_b.at - now_a.at;
         let shift = apart - Turn::of(turn_a).of_vector(carried);
@@ -118,7 +121,7 @@ impl ReuseTest<'_> {
     }
 }
 
-/// Rotation from `then` to `now`, by the shorter way.
+/// Rotation from `then` to `now`, the shorter way around.
 #[inline(always)]
 fn turn_since<L: Lanes>(now: Quat<L>, then: Quat<L>) -> Quat<L> {
     let turn = product(now, backwards(then));
@@ -157,7 +160,7 @@ mod tests {
             }
         }
 
-        /// A little before a body was where it is.
+        /// The pose of a body a little earlier.
         fn before(&mut self, body: &BodyState) -> Placed {
             let scale = 10.0_f32.powf(-2.5 + self.next());
             let turn = Quat::from_scaled_axis(self.vector() * scale) * if self.next() > 0.0 { 1.0 } else { -1.0 };

@@ -1,4 +1,5 @@
-//! Sensors: colliders that meet others without contacts. Each step looks anew which of them overlap, at the poses that the step left.
+//! Sensors: colliders that detect others without contacts. Each step finds their overlaps again, at the poses after the
+//! step.
 
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
@@ -10,7 +11,7 @@ use crate::world::{Body, BodyKind, Groups, placed};
 
 /// The bodies of all worlds, for sensors.
 pub(super) struct Visitors<'a> {
-    /// At the poses that the step left.
+    /// At the poses after the step.
     pub bodies: &'a [Body],
     pub kinds: &'a [BodyKind],
     pub groups: &'a [Groups],
@@ -19,7 +20,7 @@ pub(super) struct Visitors<'a> {
     pub jointed: &'a std::collections::HashSet<(u32, u32)>,
 }
 
-/// A sensor and another collider that overlap: for each the index of its body, and its own among the colliders of its body.
+/// A sensor and another collider that overlap. Each is the index of its body, and its own index on that body.
 pub type Overlap = [(u32, u32); 2];
 
 impl Visitors<'_> {
@@ -28,7 +29,7 @@ impl Visitors<'_> {
         Pose::from_parts(body.position, body.rotation)
     }
 
-    /// Whether a sensor sees the collider of another body: one of the two moves or is moved, and the groups of the bodies meet.
+    /// Whether a sensor can detect the collider of another body: one of the two bodies moves, and their groups match.
     pub(super) fn may_meet(&self, sensor: &ColliderInfo, other: &ColliderInfo) -> bool {
         if other.is_gone() || other.sensor || other.body == sensor.body {
             return false;
@@ -53,7 +54,7 @@ impl WorldContacts {
         }
         let mut strayed = std::mem::take(&mut self.strayed);
         strayed.clear();
-        // The tree has the boxes of the begin of the step, with room for what a body was expected to move.
+        // The tree has the boxes from the start of the step, enlarged for the expected motion.
         let has_strayed = |(c, fat): (&ColliderInfo, &Aabb)| {
             let is_still = || visitors.activity.get(c.body as usize) == Some(&Activity::Still);
             !c.is_gone() && !c.sensor && !c.unbounded && !is_still() && !fat.contains(&c.aabb(visitors.pose(c)))

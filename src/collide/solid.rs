@@ -1,4 +1,4 @@
-//! Convex solids as seen from a direction: how far they reach, and with which face.
+//! Convex solids seen from a direction: their support points and faces.
 
 use glam::Vec3;
 use parry3d::math::Pose;
@@ -9,29 +9,31 @@ use parry3d::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Sha
 /// parry's manifold, without data of drystone.
 pub(super) type ParryManifold = ContactManifold<(), ()>;
 
-/// Overlap from which an answer is checked, relative to the thinner shape's smallest half extent.
+/// Overlap from which a result is checked, relative to the smallest half extent of the thinner shape.
 pub(super) const DEEP: f32 = 0.05;
-/// How far shapes are pushed apart for a second opinion, relative to the thinner shape's smallest half extent.
+/// Distance by which shapes are pushed apart for a second result, relative to the smallest half extent of the thinner
+/// shape.
 pub(super) const PUSH: f32 = 0.02;
-/// Smallest half extent (m) from which the thinner shape of a pair is large beside parry's tolerances. They are absolute: parry takes
-/// sides as parallel that span less than 3.5 cm², and its search for a direction stops at a triangle of 11 cm².
+/// Smallest half extent (m) of the thinner shape of a pair that is large compared with parry's tolerances. They are
+/// absolute: parry treats sides as parallel if they span less than 3.5 cm², and its search for a direction stops at a
+/// triangle of 11 cm².
 pub(super) const SMALL: f32 = 1.0 / 64.0;
-/// How exactly a distance is known, relative to the thinner shape's smallest half extent.
+/// Error of a distance, relative to the smallest half extent of the thinner shape.
 pub(super) const EXACT: f32 = 1e-3;
 
 /// Range of one query.
 #[derive(Clone, Copy)]
 pub(super) struct ContactQuery {
-    /// Distance up to which contacts are sought (m).
+    /// Largest distance of a contact (m).
     pub prediction: f32,
     /// Smallest half extent of the thinner shape (m).
     pub size: f32,
 }
 
-/// A corner of a polygon, and the number that marks it from step to step.
+/// A corner of a polygon, and the number that identifies it from step to step.
 pub(super) type Corner = (Vec3, u32);
 
-/// Memory for polygons that are clipped.
+/// Reusable memory for clipped polygons.
 #[derive(Default)]
 pub(super) struct ClipBuffers {
     pub polygon: Vec<Corner>,
@@ -40,7 +42,7 @@ pub(super) struct ClipBuffers {
     pub corners: Vec<Corner>,
 }
 
-/// Keeps the part of `polygon` with n · x <= `limit`. Corners that the cut adds are numbered by their edge and by `cut`.
+/// Keeps the part of `polygon` with n · x <= `limit`. New corners are numbered by their edge and by `cut`.
 pub(super) fn clip(polygon: &mut Vec<Corner>, unclipped: &mut Vec<Corner>, normal: Vec3, limit: f32, cut: u32) {
     std::mem::swap(polygon, unclipped);
     polygon.clear();
@@ -51,7 +53,8 @@ pub(super) fn clip(polygon: &mut Vec<Corner>, unclipped: &mut Vec<Corner>, norma
             polygon.push(from);
         }
         if (beyond(from) <= 0.0) != (beyond(to) <= 0.0) {
-            // From the inside out, so that a segment, a polygon of two corners, is cut at the same place on its way back.
+            // Cut from the inside out: a segment is a polygon with two corners, and both directions must cut it at the
+            // same place.
             let (inside, outside) = if beyond(from) <= 0.0 { (from, to) } else { (to, from) };
             let share = beyond(inside) / (beyond(inside) - beyond(outside));
             let number = inside.1.wrapping_mul(31).wrapping_add(outside.1).wrapping_mul(8).wrapping_add(cut + 1);
@@ -72,7 +75,7 @@ pub(super) fn clip_to(polygon: &mut Vec<Corner>, unclipped: &mut Vec<Corner>, ba
 /// Calls `with` on the number and the half-space n · x <= limit of each side of the prism over `base` along `normal`.
 fn each_side(base: &[Corner], normal: Vec3, mut with: impl FnMut(u32, Vec3, f32)) {
     let next = |i: usize| base[(i + 1) % base.len()].0;
-    // Faces of parry's run around either way.
+    // Parry's faces run around in either direction.
     let around: Vec3 = base.iter().enumerate().map(|(i, at)| (at.0 - base[0].0).cross(next(i) - base[0].0)).sum();
     let normal = if around.dot(normal) < 0.0 { -normal } else { normal };
     for (i, from) in base.iter().enumerate() {
@@ -81,7 +84,7 @@ fn each_side(base: &[Corner], normal: Vec3, mut with: impl FnMut(u32, Vec3, f32)
     }
 }
 
-/// Adds the corners `more` that lie above or below `base`, as seen along `normal`, and are not yet in `polygon`.
+/// Adds the corners of `more` that lie above or below `base`, as seen along `normal`, and are not in `polygon` yet.
 pub(super) fn add_above(polygon: &mut Vec<Corner>, more: &[Corner], base: &[Corner], normal: Vec3) {
     for corner in more {
         let mut is_new = polygon.iter().all(|old| old.1 != corner.1);
@@ -102,14 +105,14 @@ impl SupportMap for Patch<'_> {
     }
 }
 
-/// How many times as large as it is parry sees a pair whose thinner shape has the smallest half extent `size` (m): 1 from [`SMALL`] on, and
-/// otherwise a power of two, which rounds nothing.
+/// Factor by which a pair is enlarged for parry, if its thinner shape has the smallest half extent `size` (m): 1 from
+/// [`SMALL`] on, otherwise a power of two, which causes no rounding.
 pub(super) fn magnification(size: f32) -> f32 {
     const LEAST: f32 = 1.0 / (1 << 20) as f32;
     if size < SMALL { f32::from_bits(0x7f00_0000 - (size.max(LEAST).to_bits() & 0x7f80_0000)) } else { 1.0 }
 }
 
-/// A solid that is `by` times as large.
+/// A solid, enlarged by `by`.
 pub(super) struct Magnified<'a, M: ?Sized> {
     pub map: &'a M,
     pub by: f32,
@@ -133,7 +136,7 @@ impl<M: PolygonalFeatureMap + ?Sized> PolygonalFeatureMap for Magnified<'_, M> {
     }
 }
 
-/// The middle of a ball.
+/// The center of a ball.
 struct Point;
 
 impl SupportMap for Point {
@@ -148,7 +151,7 @@ impl PolygonalFeatureMap for Point {
     }
 }
 
-/// A convex shape at a pose: a solid that is rounded off by `radius`.
+/// A convex shape at a pose: a core that is rounded by `radius`.
 pub(super) struct Solid<'a> {
     shape: &'a dyn Shape,
     pub map: &'a dyn PolygonalFeatureMap,
@@ -157,19 +160,19 @@ pub(super) struct Solid<'a> {
 }
 
 impl<'a> Solid<'a> {
-    /// None for a ball.
+    /// Returns `None` for a ball.
     pub fn new(shape: &'a dyn Shape, pose: Pose) -> Option<Self> {
         let (map, radius) = shape.as_polygonal_feature_map()?;
         Some(Self { shape, map, radius, pose })
     }
 
-    /// The same, with a ball as a point that is rounded off.
+    /// The same, with a ball as a rounded point.
     pub fn or_point(shape: &'a dyn Shape, pose: Pose) -> Option<Self> {
         let (map, radius) = features(shape, true)?;
         Some(Self { shape, map, radius, pose })
     }
 
-    /// The point of the solid that lies furthest in the direction `d`.
+    /// The support point of the solid in the direction `d`.
     pub fn furthest(&self, d: Vec3) -> Vec3 {
         self.pose * self.map.local_support_point(self.pose.rotation.inverse() * d)
     }
@@ -179,7 +182,7 @@ impl<'a> Solid<'a> {
         self.shape.distance_to_point(&self.pose, point, true) <= distance
     }
 
-    /// Writes the face or edge of the solid that lies best across `d` at its furthest corner in that direction.
+    /// Writes the face or edge of the solid that is most perpendicular to `d` at its support point.
     pub fn feature(&self, d: Vec3, polygon: &mut Vec<Corner>) {
         polygon.clear();
         let own = self.pose.rotation.inverse() * d;
@@ -189,7 +192,8 @@ impl<'a> Solid<'a> {
             let corners = feature.vertices.iter().zip(feature.vids).take(feature.num_vertices);
             return polygon.extend(corners.map(|(&at, id)| (self.pose * at, id.0)));
         };
-        // parry gives the first four corners of the face: a prism of eight sides tips over them into the floor.
+        // Parry returns only the first four corners of the face: a prism with eight sides would tip over them into the
+        // floor.
         let points = hull.points();
         let furthest = (0..points.len()).max_by(|&i, &j| points[i].dot(own).total_cmp(&points[j].dot(own)));
         let Some(vertex) = furthest.map(|i| hull.vertices()[i]) else { return };
@@ -202,8 +206,8 @@ impl<'a> Solid<'a> {
         polygon.extend(corners.iter().map(|&i| (self.pose * points[i as usize], PackedFeatureId::vertex(i).0)));
     }
 
-    /// Writes the corners besides those of its feature in the direction `d` that may touch next when the solid turns: tip
-    /// and rim of a cone, both rims of a cylinder.
+    /// Writes the corners beside the feature in the direction `d` that can touch next when the solid turns: tip and rim
+    /// of a cone, both rims of a cylinder.
     pub fn corners(&self, d: Vec3, corners: &mut Vec<Corner>) {
         corners.clear();
         let own = self.pose.rotation.inverse() * d;
@@ -237,8 +241,8 @@ impl<'a> Solid<'a> {
         }
     }
 
-    /// The corners of `polygon`, a feature of the solid, as contacts along `normal` with the plane of `face` through `origin`.
-    /// The first points lie in that plane; the others are the solid's, in its own frame.
+    /// The corners of `polygon`, a feature of the solid, as contacts along `normal` with the plane of `face` through
+    /// `origin`. The first points lie in that plane. The second points lie on the solid, in its own frame.
     pub fn contacts<'b>(
         &'b self,
         polygon: &'b [Corner],
@@ -253,13 +257,13 @@ impl<'a> Solid<'a> {
     }
 }
 
-/// What a shape touches with, and the radius that rounds it off. parry needs no search for a ball but beside a hull.
+/// The core that a shape touches with, and its rounding radius. For a ball parry needs a search only beside a hull.
 fn features(shape: &dyn Shape, has_hull: bool) -> Option<(&dyn PolygonalFeatureMap, f32)> {
     let ball = shape.as_ball().filter(|_| has_hull).map(|ball| (&Point as &dyn PolygonalFeatureMap, ball.radius));
     ball.or(shape.as_polygonal_feature_map())
 }
 
-/// parry's answer, with normals of a within `cone`. Every pair of convex shapes is supported.
+/// Parry's result, with normals of a within `cone`. Every pair of convex shapes is supported.
 pub(super) fn ask(
     (a, b): (&dyn Shape, &dyn Shape),
     pos12: &Pose,

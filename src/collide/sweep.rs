@@ -1,9 +1,10 @@
-//! When two shapes meet on their way through a step, by conservative advancement.
+//! Time of impact of two shapes within a step, by conservative advancement.
 //!
-//! Centers of mass go straight, and bodies turn about axes that stay. Along a direction d the surfaces are apart by f(t), the least of d · x over
-//! the points of b less the most over those of a. Over the time t, a point with the arm r moves by d · (v + w × r) t and off that line by no more
-//! than |w|² |r| t² / 2, so that one support of each shape in a direction that is turned a little bounds f from below for all the time up to t.
-//! The bound is concave: where it holds at the end it holds on the way. No shape ever comes closer unseen.
+//! Centers of mass move straight, and bodies turn about constant axes. Let f(t) be the separation of the surfaces along
+//! a direction d: the least d · x over the points of b, minus the largest over those of a. Over the time t, a point
+//! with the arm r moves by d · (v + w × r) t, and deviates from that line by at most |w|² |r| t² / 2. So one support
+//! point of each shape, in a slightly turned direction, bounds f from below for all times up to t. The bound is
+//! concave: if it holds at the end of an interval, it holds within it. No closer approach of the shapes is missed.
 
 use glam::{Quat, Vec3};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -17,31 +18,31 @@ use super::solid::{Magnified, Solid, magnification};
 use crate::math::rotation::{about, product, unit, vector_of};
 use crate::world::placed;
 
-/// Where a body is at a time: its center of mass, and its rotation.
+/// Position of the center of mass and rotation of a body at a time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Station {
     pub center: Vec3,
     pub rotation: Quat,
 }
 
-/// The way of a body through a step, whose length is 1.
+/// The path of a body through a step, whose length is 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Way {
     pub begin: Station,
-    /// How far the center of mass goes (m).
+    /// Displacement of the center of mass (m).
     pub shift: Vec3,
-    /// How far the body turns (rad).
+    /// Rotation of the body (rad).
     pub turn: Vec3,
 }
 
 impl Way {
-    /// Of a body that nothing touches in a step of `dt` seconds.
+    /// The path of a free body in a step of `dt` seconds.
     pub fn free(body: &BodyState, dt: f32) -> Self {
         let begin = Station { center: body.center, rotation: body.rotation };
         Self { begin, shift: (body.v + 0.5 * dt * body.pull) * dt, turn: body.w * dt }
     }
 
-    /// From one place to another, with the turn that is nearest to `spin` (rad).
+    /// The path from one pose to another, with the rotation that is nearest to `spin` (rad).
     pub fn between(begin: Station, end: Station, spin: Vec3) -> Self {
         let turn = product(end.rotation, begin.rotation.inverse());
         let turn = vector_of(if turn.w < 0.0 { -turn } else { turn });
@@ -50,51 +51,51 @@ impl Way {
         Self { begin, shift: end.center - begin.center, turn: turn + more * std::f32::consts::TAU * axis }
     }
 
-    /// The turn up to a time.
+    /// The rotation up to a time.
     pub fn turned(&self, time: f32) -> Quat {
         let angle = self.turn.length();
         if angle < 1e-12 { Quat::IDENTITY } else { about(self.turn / angle, angle * time) }
     }
 
-    /// Where the body is at a time.
+    /// The pose of the body at a time.
     pub fn at(&self, time: f32) -> Station {
         let rotation = unit(product(self.turned(time), self.begin.rotation));
         Station { center: self.begin.center + time * self.shift, rotation }
     }
 }
 
-/// A convex shape on its way.
+/// A convex shape on its path.
 #[derive(Clone, Copy)]
 struct Mover<'a> {
     way: &'a Way,
     shape: &'a dyn Shape,
-    /// The shape less its rounding; none for a point.
+    /// The shape without its rounding; `None` for a point.
     core: Option<&'a dyn PolygonalFeatureMap>,
     radius: f32,
-    /// Place of the shape as seen from the center of mass of its body.
+    /// Pose of the shape relative to the center of mass of its body.
     local: Pose,
-    /// Radius around the center of mass that holds the core (m).
+    /// Radius around the center of mass that contains the core (m).
     reach: f32,
 }
 
-/// A shape of a body, and the way of the body.
+/// A shape of a body, and the path of the body.
 #[derive(Clone, Copy)]
 pub(super) struct Swept<'a> {
     pub shape: &'a dyn Shape,
-    /// Place of the shape as seen from the center of mass of its body.
+    /// Pose of the shape relative to the center of mass of its body.
     local: Pose,
     way: &'a Way,
 }
 
 impl<'a> Swept<'a> {
-    /// A collider of `body`, whose center of mass stays where it is in the frame of the body.
+    /// A collider of `body`. The center of mass keeps its place in the frame of the body.
     pub fn new(collider: &'a ColliderInfo, body: &BodyState, way: &'a Way) -> Self {
         let center = body.rotation.inverse() * (body.center - body.position);
         let local = Pose::from_parts(collider.local.translation - center, collider.local.rotation);
         Self { shape: &*collider.shape, local, way }
     }
 
-    /// The ball of this radius around the middle of the shape, on the same way.
+    /// A ball with this radius around the middle of the shape, on the same path.
     pub fn heart<'b>(&self, ball: &'b Ball) -> Swept<'b>
     where
         'a: 'b,
@@ -108,19 +109,19 @@ impl<'a> Swept<'a> {
         self.shape.as_trimesh().is_some() || self.shape.as_heightfield().is_some()
     }
 
-    /// Radius around the center of mass that holds the shape (m).
+    /// Radius around the center of mass that contains the shape (m).
     fn reach(&self) -> f32 {
         let sphere = self.shape.compute_local_bounding_sphere();
         (self.local.translation + self.local.rotation * sphere.center()).length() + sphere.radius()
     }
 
-    /// A box around the shape all the way.
+    /// A box around the shape on its whole path.
     pub fn aabb(&self) -> Aabb {
         let (from, to) = (self.way.begin.center, self.way.begin.center + self.way.shift);
         Aabb::new(from.min(to), from.max(to)).loosened(self.reach())
     }
 
-    /// As a convex shape; none for a half-space, mesh or height field.
+    /// As a convex shape; `None` for a half-space, mesh or height field.
     fn mover(&self) -> Option<Mover<'a>> {
         let Self { shape, local, way, .. } = *self;
         if let Some(ball) = shape.as_ball() {
@@ -137,7 +138,7 @@ impl<'a> Swept<'a> {
 struct Stood<'a> {
     core: Option<&'a dyn PolygonalFeatureMap>,
     center: Vec3,
-    /// Of the shape as seen from the center of mass, in world axes.
+    /// Pose of the shape relative to the center of mass, in world axes.
     arm: Pose,
 }
 
@@ -150,46 +151,47 @@ impl<'a> Mover<'a> {
 }
 
 impl Stood<'_> {
-    /// The arm of the point of the core that lies furthest in a direction of any length.
+    /// Arm of the core's support point in a direction of any length.
     fn furthest(&self, d: Vec3) -> Vec3 {
         let own = |core: &dyn PolygonalFeatureMap| core.local_support_point(self.arm.rotation.inverse() * d);
         self.arm.translation + self.core.map_or(Vec3::ZERO, |core| self.arm.rotation * own(core))
     }
 }
 
-/// The first time at which two shapes are near enough, and the direction from a to b there.
+/// The first time at which two shapes are near enough, and the direction from a to b at that time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Impact {
     pub time: f32,
     pub normal: Vec3,
-    /// Whether they touched when the step began.
+    /// Whether they touched at the start of the step.
     pub is_deep: bool,
 }
 
-/// When two shapes have met.
+/// The event to search for.
 #[derive(Clone, Copy)]
 pub(super) enum Until {
-    /// Where their surfaces meet; at once, if they meet when the step begins.
+    /// The surfaces meet; at once, if they meet at the start of the step.
     Meet,
-    /// Where their surfaces meet; never, if they meet when the step begins.
+    /// The surfaces meet; never, if they meet at the start of the step.
     Touch,
-    /// Where their surfaces meet; never, if they overlap when the step begins.
+    /// The surfaces meet; never, if they overlap at the start of the step.
     Enter,
-    /// Where one is deeper in the other than a contact lets it be.
+    /// One shape is deeper in the other than a contact allows.
     Deep,
 }
 
-/// How exactly a distance is met, relative to the smallest half extent of the thinner shape.
+/// Tolerance of a distance, relative to the smallest half extent of the thinner shape.
 const NEAR: f32 = 1e-3;
-/// How deep what touches may get before it is held, and how much deeper a step may bring what is held, relative to the same.
+/// Depth of a touching shape at which it is held, and the largest additional depth of a held shape in one step,
+/// relative to the same.
 const HELD: f32 = 0.2;
 const DEEPER: f32 = 0.002;
-/// From where on something overlaps that did not get there by what it passed through: walls press it, or it began there. It comes out, and turns as it
-/// does. Relative to the same.
+/// Depth from which the shape did not get there by passing through: walls press it, or it began there. It is not held,
+/// and turns as it comes out. Relative to the same.
 const STUCK: f32 = 0.35;
-/// How deep something may be and still be held, relative to the same.
+/// Largest depth at which a shape is held, relative to the same.
 const DEEPEST: f32 = 0.9;
-/// Most pieces of a way.
+/// Largest number of pieces of a path.
 const PIECES: usize = 256;
 
 impl Until {
@@ -197,7 +199,8 @@ impl Until {
         !matches!(self, Self::Deep)
     }
 
-    /// The separation up to which shapes move that are apart by so much when the step begins; none where they are not looked at.
+    /// The target separation for shapes with separation `apart` at the start of the step. Returns `None` if they are
+    /// not checked.
     fn least(self, apart: f32, near: f32, size: f32) -> Option<f32> {
         match self {
             Self::Meet => Some(0.0),
@@ -212,9 +215,9 @@ impl Until {
     }
 }
 
-/// When two shapes meet, of which at most one is a mesh or height field; lengths are as exact as `size` asks, half of the smallest side of what moves.
-/// Of meshes and height fields, only the sides count that face the center of the other body when
-/// the step begins, if `is_one_sided`.
+/// The time of impact of two shapes, of which at most one is a mesh or height field. `size` sets the tolerance of
+/// lengths: half of the smallest side of the moving shape. If `is_one_sided`, only those sides of meshes and height
+/// fields count that face the center of the other body at the start of the step.
 pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: bool) -> Option<Impact> {
     let turned = |impact: Impact| Impact { normal: -impact.normal, ..impact };
     if b.is_composite() || b.shape.as_halfspace().is_some() {
@@ -226,7 +229,7 @@ pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: 
         return with_plane(&a, rotation * plane.normal, &moving, size, until);
     }
     if !a.is_composite() {
-        // The same bits whichever of them comes first.
+        // Gives the same bits for either order of the shapes.
         let [at_a, at_b] = [a, b].map(|side| side.way.begin.center.to_array());
         if until.is_of_both() && at_b.partial_cmp(&at_a) == Some(std::cmp::Ordering::Less) {
             let search = Search { a: moving, b: a.mover()?, faces: None, size, until, latest: 1.0 };
@@ -234,7 +237,7 @@ pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: 
         }
         return Search { a: a.mover()?, b: moving, faces: None, size, until, latest: 1.0 }.run();
     }
-    // The way of b as a is.
+    // The path of b in the frame of a.
     let pose = Pose::from_parts(
         a.way.begin.center + a.way.begin.rotation * a.local.translation,
         product(a.way.begin.rotation, a.local.rotation),
@@ -279,7 +282,7 @@ pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: 
     first
 }
 
-/// Whether two shapes overlap at the end of their ways: what is cheaper to ask than when they meet.
+/// Whether two shapes overlap at the end of their paths. This is cheaper than the time of impact.
 pub(super) fn overlap_at_end(a: Swept, b: Swept) -> bool {
     let [at, of] = [a, b].map(|side| {
         let Station { center, rotation } = side.way.at(1.0);
@@ -288,7 +291,7 @@ pub(super) fn overlap_at_end(a: Swept, b: Swept) -> bool {
     intersection_test(&at, a.shape, &of, b.shape).is_ok_and(|answer| answer.intersecting)
 }
 
-/// The same for a half-space, whose body stays.
+/// The same for a half-space whose body does not move.
 fn with_plane(plane: &Swept, normal: Vec3, b: &Mover, size: f32, until: Until) -> Option<Impact> {
     let point = plane.way.begin.center + plane.way.begin.rotation * plane.local.translation;
     let apart = |stood: &Stood, d: Vec3| d.dot(stood.furthest(-d)) - b.radius;
@@ -310,25 +313,25 @@ fn with_plane(plane: &Swept, normal: Vec3, b: &Mover, size: f32, until: Until) -
     Some(pieces.impact(normal))
 }
 
-/// How far from exact a separation is, by the sizes of the numbers that it is made of.
+/// Rounding error of a separation, from the sizes of its terms.
 fn rounding(way: &Way, apart: Vec3) -> f32 {
     2.0 * f32::EPSILON * (way.shift.length() + apart.length())
 }
 
-/// Half of the most that a point of the core is accelerated by the turn.
+/// Half of the largest acceleration of a core point by the rotation.
 fn bend(mover: &Mover) -> f32 {
     0.5 * mover.reach * mover.way.turn.length_squared()
 }
 
-/// Two convex shapes on their ways.
+/// Two convex shapes on their paths.
 struct Search<'a> {
     a: Mover<'a>,
     b: Mover<'a>,
-    /// The normal of a, a triangle, in its own frame, and whether it has two sides.
+    /// The normal of a in its own frame, if a is a triangle, and whether the triangle has two sides.
     faces: Option<(Vec3, bool)>,
     size: f32,
     until: Until,
-    /// The time from which on nobody asks.
+    /// The latest time of interest.
     latest: f32,
 }
 
@@ -336,7 +339,7 @@ impl Search<'_> {
     fn run(&self) -> Option<Impact> {
         let Self { a, b, size, until, latest, .. } = *self;
         let shift = b.way.shift - a.way.shift;
-        // Most pairs whose boxes overlap stay apart by their middles.
+        // Most pairs with overlapping boxes stay apart along the line of their middles.
         let from = b.way.begin.center - a.way.begin.center;
         let share = (-from.dot(shift) / shift.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         if (from + share * shift).length() > a.reach + a.radius + b.reach + b.radius + NEAR * size {
@@ -365,7 +368,8 @@ impl Search<'_> {
         Some(pieces.impact(known))
     }
 
-    /// The direction from a to b along which they are furthest apart, as far as that is asked: where it parts them by more than `enough`, a good one is.
+    /// The direction from a to b along which they are furthest apart. A good direction is sufficient if it separates
+    /// them by more than `enough`.
     fn direction(&self, [a, b]: &[Stood; 2], known: Vec3, enough: f32) -> Vec3 {
         let apart = b.center - a.center;
         let along =
@@ -400,7 +404,7 @@ impl Search<'_> {
         best.1
     }
 
-    /// The direction of the shortest way between the cores; none where they overlap.
+    /// The direction of the shortest distance between the cores; `None` if they overlap.
     fn search(&self, [a, b]: [&Stood; 2]) -> Option<Vec3> {
         let back = a.arm.rotation.inverse();
         let between = back * ((b.center - a.center) + b.arm.translation - a.arm.translation);
@@ -416,7 +420,7 @@ impl Search<'_> {
         simplex.reset(CsoPoint::from_shapes(&pos12, &map_a, &map_b, (-between).normalize_or(Vec3::X)));
         match closest_points(&pos12, &map_a, &map_b, f32::MAX, true, &mut simplex) {
             GJKResult::ClosestPoints(on_a, on_b, d) => {
-                // The points tell the direction better than the search where it stopped early.
+                // If the search stopped early, the points give a better direction than the search.
                 let d = (on_b - on_a).try_normalize().unwrap_or(d);
                 (a.arm.rotation * d).try_normalize()
             }
@@ -429,7 +433,7 @@ fn as_support_map(core: &dyn PolygonalFeatureMap) -> &dyn SupportMap {
     core
 }
 
-/// The middle of a ball.
+/// The center of a ball.
 struct Point;
 
 impl SupportMap for Point {
@@ -438,13 +442,13 @@ impl SupportMap for Point {
     }
 }
 
-/// How far a way is known to be free.
+/// The part of a path that is known to be free.
 struct Pieces {
     time: f32,
     latest: f32,
-    /// The separation that is sought.
+    /// The target separation.
     least: Option<f32>,
-    /// Whether the shapes touch when the step begins.
+    /// Whether the shapes touch at the start of the step.
     touched: bool,
 }
 
@@ -452,7 +456,7 @@ struct Pieces {
 enum Piece {
     /// The shapes are near enough.
     Met,
-    /// They never are, or are not looked at.
+    /// They are never near enough, or are not checked.
     End,
     On,
 }
@@ -466,7 +470,8 @@ impl Pieces {
         Impact { time: self.time, normal, is_deep: self.touched }
     }
 
-    /// Goes on as far as `bound`, a concave function of the time from now on, stays above what is sought, which `least` tells at the first time.
+    /// Advances while `bound`, a concave function of the time from now, stays above the target separation. `least`
+    /// returns the target at the first time.
     fn next(&mut self, bound: impl Fn(f32) -> f32, near: f32, least: impl Fn(f32) -> Option<f32>) -> Piece {
         let now = bound(0.0);
         let least = match self.least {
@@ -482,7 +487,7 @@ impl Pieces {
         if now <= least + near {
             return Piece::Met;
         }
-        // What moves straight meets what is sought to the last bits, and should not be behind it.
+        // A straight path meets the target to the last bits, and must not pass it.
         let least = least + 0.25 * near;
         let (mut time, mut above) = (0.0, now - least);
         let mut late = self.latest - self.time;
@@ -490,7 +495,7 @@ impl Pieces {
         if below >= 0.0 {
             return Piece::End;
         }
-        // The chord of a concave function lies below it; a little before its root, rounding does not matter.
+        // The chord of a concave function lies below it. A little before the root, rounding does not matter.
         for _ in 0..4 {
             if above < 0.5 * near {
                 break;
@@ -502,7 +507,7 @@ impl Pieces {
                 continue;
             }
             (time, above) = (next, value);
-            // Behind the root, but nearer.
+            // Past the root, but nearer to it.
             let other = 0.5 * (time + late);
             let value = bound(other) - least;
             if value < 0.0 { (late, below) = (other, value) } else { (time, above) = (other, value) }

@@ -1,8 +1,8 @@
-//! Contacts of bodies that the caller put elsewhere between two steps.
+//! Contacts of bodies that the caller moved between two steps.
 //!
-//! A contact of the same two shapes takes over the impulses and the preload of the one before, by its features. That is right as long as the
-//! bodies move by themselves, or are put right by a little. Of a body that was put elsewhere it is not: a box of 1 kg from under 8,000 kg came off
-//! the floor by 4.6 mm where it was put on the same floor.
+//! A contact of the same two shapes keeps the impulses and the preload of the contact before, matched by features. That
+//! is right if the bodies move on their own, or if the caller corrects them by a little. It is wrong for a teleported
+//! body: a box of 1 kg, moved out from under 8,000 kg to another place on the same floor, jumped 4.6 mm off the floor.
 
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use super::pairs::Pairs;
 use crate::math::rotation::product;
 use crate::world::{Bodies, Body, BodyKind};
 
-/// Where a body was left by the last step.
+/// The pose of a body after the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Left {
     rotation: Quat,
@@ -26,7 +26,7 @@ impl Left {
         Self { rotation: body.rotation, position: body.position }
     }
 
-    /// Whether the body is there, to the last bit.
+    /// Whether the body still has this pose, to the last bit.
     pub fn is_of(&self, body: &Body) -> bool {
         let bits =
             |left: &Self| (left.rotation.to_array().map(f32::to_bits), left.position.to_array().map(f32::to_bits));
@@ -34,27 +34,27 @@ impl Left {
     }
 }
 
-/// Where all bodies were left, and where they are now; made only if one of them was put elsewhere.
+/// The poses of all bodies after the last step and now. It exists only if the caller moved one of them.
 pub(super) struct Teleports<'a> {
     left: &'a [Left],
     now: Vec<Left>,
 }
 
 impl<'a> Teleports<'a> {
-    /// None if every body is where it was left.
+    /// Returns `None` if every body has the pose that the step left.
     pub fn find(left: &'a [Left], bodies: &Bodies) -> Option<Self> {
         let is_elsewhere = |(body, left): (&Body, &Left)| Left::of(body) != *left;
         let any = bodies.par_iter().with_min_len(1024).zip(left).any(is_elsewhere);
         any.then(|| Self { left, now: bodies.iter().map(Left::of).collect() })
     }
 
-    /// Ends the contacts between bodies of which one was put farther off from the other than the thinner shape is thick, half of its smallest side:
-    /// what it touched is not where it touches now. A body that moves together with all movable bodies that it touches keeps the contacts with them,
-    /// and bears the same loads.
+    /// Ends the contacts of two bodies if the caller moved one of them relative to the other by more than half of the
+    /// smallest side of the thinner shape: their contact points are no longer the same. A body that moves together with
+    /// all movable bodies that it touches keeps the contacts with them, and carries the same loads.
     pub fn end_contacts(&self, kinds: &[BodyKind], pairs: &mut Pairs) {
         let is_movable = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
         let mut parted = Vec::new();
-        // By body: whether something that can be pushed stays where the body touches it, and whether something parts.
+        // For each body: whether it keeps its place relative to a movable body that it touches, and to another one not.
         let mut company = vec![(false, false); self.now.len()];
         for place in (0..pairs.len()).filter(|&place| pairs[place].is_touching()) {
             let (bodies, parts) = ([pairs[place].body_a, pairs[place].body_b], self.parts(pairs, place));
@@ -75,7 +75,7 @@ impl<'a> Teleports<'a> {
         }
     }
 
-    /// Whether the bodies of a pair were put apart.
+    /// Whether the caller moved the bodies of a pair apart.
     fn parts(&self, pairs: &Pairs, place: usize) -> bool {
         let Pair { body_a, body_b, size, .. } = pairs[place];
         let [a, b] = [body_a as usize, body_b as usize];

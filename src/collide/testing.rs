@@ -1,10 +1,10 @@
-//! Random numbers for tests of the detection, the same everywhere.
+//! Random numbers for tests of the detection, the same on every platform.
 
 use glam::{Quat, Vec3};
 
 use crate::random::mixed;
 
-/// A stream, by the number before its first.
+/// A stream with this seed.
 pub struct Random(pub u64);
 
 impl Random {

@@ -1,8 +1,8 @@
-//! Which boxes of a world overlap: a tree of boxes, four to a node.
+//! A tree of boxes with four children a node. It finds overlapping boxes of a world.
 //!
-//! The tree has no pointers. Boxes stand in an order in which neighbors are near each other, and node i of a level holds the nodes
-//! 4 i to 4 i + 3 of the level below. With parry's tree and a table of the pairs, the broad phase of a falling pile of 20,000 boxes took
-//! 3.4 times as long.
+//! The tree has no pointers. Boxes are stored in an order in which neighbors are near each other, and node i of a level
+//! holds the nodes 4 i to 4 i + 3 of the level below. With parry's tree and a table of pairs, the broad phase of a
+//! falling pile of 20,000 boxes took 3.4 times as long.
 
 use glam::{Vec3, Vec4};
 use parry3d::bounding_volume::Aabb;
@@ -10,32 +10,32 @@ use rayon::prelude::*;
 
 use super::collider::FARTHEST;
 
-/// A box that overlaps none.
+/// A box that overlaps no other.
 pub(super) const NOWHERE: Aabb = Aabb { mins: Vec3::splat(2.0 * FARTHEST), maxs: Vec3::splat(-2.0 * FARTHEST) };
 
-/// Boxes of one node.
+/// Children of one node.
 const WIDTH: usize = 4;
-/// Level up to which a pair of nodes is searched by one thread: 256 boxes each.
+/// Level up to which one thread searches a pair of nodes: 256 boxes each.
 const ALONE: usize = 3;
-/// Length to which leaves may stretch, relative to the length when their boxes were arranged: then they are arranged anew.
+/// If leaves stretch to more than this multiple of their length at the last arrangement, the boxes are arranged again.
 const STRETCH: f32 = 1.2;
-/// Most that one leaf counts, because a box that flew far away says nothing of the others.
+/// Largest weight of one leaf: a box that flew far away says nothing about the others.
 const MOST_STRETCH: f32 = 16.0;
-/// Nodes that wait in a search: three of each level above the leaves, of which there are 15 for 2^32 boxes, and one more.
+/// Capacity of the search stack: three nodes of each level above the leaves (15 levels for 2^32 boxes), and one more.
 const WAITING: usize = 64;
-/// Share of boxes that are far from where they were arranged from which on they are arranged anew, as one in so many.
+/// If one box in this many is far from its arranged place, the boxes are arranged again.
 const STRAYS: usize = 8;
 
-/// The tree, for as many boxes as it was last given.
+/// The tree over the last given boxes.
 #[derive(Default)]
 pub(super) struct Tree {
-    /// The boxes by their indices, in the order of the leaves.
+    /// The indices of the boxes, in the order of the leaves.
     order: Vec<u32>,
-    /// The leaves first, and the one root last.
+    /// The leaves first, the root last.
     levels: Vec<Vec<Node>>,
-    /// The leaves as they were before boxes changed.
+    /// The leaves before boxes changed.
     before: Vec<Node>,
-    /// How long leaves were, relative to their boxes, when those were arranged.
+    /// Average length of the leaves relative to their boxes, at the last arrangement.
     arranged: f32,
 }
 
@@ -46,7 +46,7 @@ crate::saved::cloned!(Tree { order, levels, arranged } scratch { before });
 struct Node {
     mins: [Vec4; 3],
     maxs: [Vec4; 3],
-    /// One bit a box: whether it, or one below it, changed.
+    /// One bit for each box: whether it or a box below it changed.
     changed: u32,
 }
 
@@ -65,7 +65,7 @@ impl Node {
         Aabb { mins, maxs: Vec3::from(self.maxs.map(Vec4::max_element)) }
     }
 
-    /// Which of its boxes overlap which of another node, one bit each: four for the first box, and so on.
+    /// Which of its boxes overlap which boxes of another node. Four bits for the first box, and so on.
     fn overlaps(&self, other: &Self) -> u32 {
         let lane = |lane: usize| {
             let axis = |k: usize| {
@@ -77,13 +77,13 @@ impl Node {
         lane(0) | lane(1) | lane(2) | lane(3)
     }
 
-    /// Which of these pairs have a box that changed.
+    /// Which of these pairs have a changed box.
     fn changes(&self, other: &Self) -> u32 {
         let lane = |lane: u32| if self.changed >> lane & 1 == 1 { 0xf } else { other.changed } << (4 * lane);
         lane(0) | lane(1) | lane(2) | lane(3)
     }
 
-    /// Sum of the sides of the box around its boxes, over those of its boxes.
+    /// Sum of the sides of the node's box, divided by the sum of the sides of its children.
     fn stretch(&self) -> f32 {
         let sides = |axis: usize| (self.maxs[axis] - self.mins[axis]).max(Vec4::ZERO);
         let boxes = (sides(0) + sides(1) + sides(2)).element_sum();
@@ -96,7 +96,7 @@ fn length(aabb: &Aabb) -> f32 {
 }
 
 impl Tree {
-    /// Takes over the boxes, of which some changed from what they were `before`. New boxes stand behind the others.
+    /// Takes over the boxes. Some of them differ from `before`, and new boxes come after the others.
     pub fn follow(&mut self, boxes: &[Aabb], before: &[Aabb], changed: &[bool]) {
         let is_new = self.order.is_empty();
         self.order.extend(self.order.len() as u32..boxes.len() as u32);
@@ -113,7 +113,8 @@ impl Tree {
         leaves(&self.order, then, |_| false, &mut self.before);
     }
 
-    /// A tree for searches over other boxes, in the order of this one. `strays` of them are not near the box that they had here.
+    /// A tree for queries over other boxes, in the order of this one. `strays` of them are not near the box that they
+    /// had here.
     pub fn for_boxes(&self, boxes: &[Aabb], strays: usize) -> Self {
         let mut tree = Self { order: self.order.clone(), ..Self::default() };
         tree.order.extend(tree.order.len() as u32..boxes.len() as u32);
@@ -158,15 +159,15 @@ impl Tree {
         }
     }
 
-    /// How long leaves are relative to their boxes, on average.
+    /// Average length of the leaves relative to their boxes.
     fn stretch(&self) -> f32 {
         let leaves = &self.levels[0];
         leaves.iter().map(Node::stretch).sum::<f32>() / leaves.len() as f32
     }
 
-    /// Visits boxes, the nearer ones of a node first. `bound` gives for four boxes, by the lower and upper coordinates along each axis, what
-    /// `visit` finds at least in each. `visit` gets a box with its bound and returns the limit from then on: boxes of a larger bound are
-    /// left out.
+    /// Visits boxes, the nearer ones of a node first. `bound` takes the lower and upper coordinates of four boxes along
+    /// each axis, and returns a lower bound of the result in each. `visit` gets a box with its bound and returns the
+    /// new limit: boxes with a larger bound are skipped.
     pub fn nearest(
         &self,
         mut limit: f32,
@@ -196,7 +197,7 @@ impl Tree {
                 }
                 continue;
             }
-            // The nearest is taken next.
+            // The nearest is popped next.
             for lane in lanes.into_iter().rev().filter(|&lane| bounds[lane] <= limit) {
                 waiting[count] = (bounds[lane], level - 1, WIDTH * node.0 + lane);
                 count += 1;
@@ -204,7 +205,7 @@ impl Tree {
         }
     }
 
-    /// Calls `visit` on each box that overlaps another one, in an order that the boxes of all steps decide.
+    /// Calls `visit` on each box that overlaps a given one. The order depends on the boxes of all earlier steps.
     pub fn visit(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
         if !self.order.is_empty() {
             let one = Node::new([*aabb, NOWHERE, NOWHERE, NOWHERE], 0);
@@ -221,12 +222,13 @@ impl Tree {
         }
     }
 
-    /// Finds all pairs of boxes that overlap, did not before, and that `accept` takes, in an order that depends on the number of threads.
+    /// Finds all pairs of boxes that newly overlap and that `accept` accepts. The order depends on the number of
+    /// threads.
     pub fn overlaps(&self, accept: &(impl Fn(u32, u32) -> bool + Sync)) -> Vec<(u32, u32)> {
         if self.order.is_empty() { Vec::new() } else { self.overlaps_of(self.levels.len() - 1, [0, 0], accept) }
     }
 
-    /// The same among the boxes of two nodes of a level, which may be one.
+    /// The same among the boxes of two nodes of one level, or within one node.
     fn overlaps_of(
         &self,
         level: usize,
@@ -263,12 +265,13 @@ impl Tree {
         });
     }
 
-    /// Calls `visit` for the pairs of boxes of two nodes that overlap, those of leaves that did not overlap before.
+    /// Calls `visit` for the overlapping pairs of boxes of two nodes; in leaves, only for pairs that did not overlap
+    /// before.
     fn descend(&self, level: usize, [a, b]: [usize; 2], mut visit: impl FnMut([usize; 2])) {
         let nodes = &self.levels[level];
         let mut hits = nodes[a].overlaps(&nodes[b]) & nodes[a].changes(&nodes[b]);
         if a == b {
-            // Each pair once; a leaf's box not with itself, but a node with itself.
+            // Visit each pair once: a box in a leaf not with itself, but a node with itself.
             hits &= if level == 0 { 0x08ce } else { 0x8cef };
         }
         if level == 0 && hits != 0 {
@@ -282,7 +285,7 @@ impl Tree {
     }
 }
 
-/// The leaves of boxes in an order, with the boxes that changed.
+/// The leaves over boxes in an order, and which boxes changed.
 fn leaves(
     order: &[u32],
     of: impl Fn(usize) -> Aabb + Sync,
@@ -300,8 +303,8 @@ fn leaves(
     order.par_chunks(WIDTH).with_min_len(256).map(leaf).collect_into_vec(leaves);
 }
 
-/// Sorts places so that those of a node are near each other: halves them across their longest side, down to one leaf. Equal ones go by
-/// their indices.
+/// Sorts points so that those of a node are near each other: it halves them across their longest side, down to one
+/// leaf. Ties go by index.
 fn arrange(places: &mut [(Vec3, u32)]) {
     if places.len() <= WIDTH {
         return;
@@ -309,13 +312,13 @@ fn arrange(places: &mut [(Vec3, u32)]) {
     let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (mins, maxs) = places.iter().fold(none, |(mins, maxs), place| (mins.min(place.0), maxs.max(place.0)));
     let axis = (maxs - mins).max_position();
-    // As many nodes of the level below go to either side; all but the last are full.
+    // Both sides get whole nodes of the level below; all but the last are full.
     let mut node = WIDTH;
     while node * WIDTH < places.len() {
         node *= WIDTH;
     }
     let middle = places.len().div_ceil(node) / 2 * node;
-    // Boxes of a lattice have many equals along one axis.
+    // Boxes of a lattice have many equal coordinates along one axis.
     let by = |k: usize| move |a: &(Vec3, u32), b: &(Vec3, u32)| a.0[(axis + k) % 3].total_cmp(&b.0[(axis + k) % 3]);
     let compare = |a: &_, b: &_| by(0)(a, b).then_with(|| by(1)(a, b)).then_with(|| by(2)(a, b)).then(a.1.cmp(&b.1));
     places.select_nth_unstable_by(middle, compare);
@@ -335,7 +338,7 @@ mod tests {
     use super::*;
     use crate::random::SplitMix64;
 
-    /// Boxes from 1 cm to 10 m that jump, slowly or far, and come and go; two of three stand still in a step.
+    /// Boxes from 1 cm to 10 m move slowly, jump, appear and disappear. Two of three do not move in a step.
     #[test]
     fn all_pairs_that_begin_to_overlap_are_found_once_on_any_number_of_threads() {
         let pools = [1, 3].map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a pool"));
@@ -373,7 +376,7 @@ mod tests {
         }
     }
 
-    /// A search costs as many comparisons of nodes as leaves stretch.
+    /// The cost of a search, in node comparisons, grows with the stretch of the leaves.
     #[test]
     fn boxes_that_mix_are_arranged_anew_and_boxes_that_fall_together_are_not() {
         let place = |i: usize, step: usize| Vec3::new((i % 10) as f32, (i / 100 + step) as f32, (i / 10 % 10) as f32);

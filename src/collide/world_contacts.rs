@@ -1,4 +1,4 @@
-//! The colliders of one world: which of them are near each other, and what they touch with.
+//! The colliders of one world: near pairs, and their contacts.
 
 mod saved;
 
@@ -21,7 +21,7 @@ use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
 use crate::world::{BodyKind, Collider, Groups, placed};
 
-/// The input of one detection, for all worlds; body indices count over all worlds.
+/// Input of one detection for all worlds. Body indices count over all worlds.
 pub(super) struct DetectionInput<'a> {
     pub margins: Margins,
     pub kinds: &'a [BodyKind],
@@ -32,7 +32,7 @@ pub(super) struct DetectionInput<'a> {
     pub jointed: &'a HashSet<(u32, u32)>,
 }
 
-/// The colliders of one body, which stand side by side.
+/// The colliders of one body, in contiguous places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct ColliderRange {
     pub first: u32,
@@ -47,24 +47,24 @@ impl ColliderRange {
     }
 }
 
-/// The colliders of one world, which meet no others.
+/// The colliders of one world. They meet no colliders of other worlds.
 #[derive(Default)]
 pub(super) struct WorldContacts {
     pub(super) colliders: Vec<ColliderInfo>,
-    /// Those that left since the last detection; their pairs have not ended yet.
+    /// Colliders that were removed since the last detection. Their pairs have not ended yet.
     leaving: Vec<ColliderRange>,
-    /// The first of as many places side by side as a number says, without colliders; the last is taken first.
+    /// Vacant runs of places, by length: the first place of each. The last one is used first.
     vacant: BTreeMap<u32, Vec<u32>>,
-    /// The same, of those that are cuboids.
+    /// Cuboid data of each collider.
     cuboids: Vec<CuboidPlace>,
     /// Fattened box of each collider.
     pub(super) fat: Vec<Aabb>,
-    /// Whether it is new in this detection; a half-space, whether it moved.
+    /// Whether the box is new in this detection; for a half-space, whether it moved.
     moved: Vec<bool>,
-    /// The box before, if it is new.
+    /// The box before, if the box is new.
     before: Vec<Aabb>,
     pub(super) tree: Tree,
-    /// The half-spaces that are no sensors.
+    /// The half-spaces, without sensors.
     pub(super) planes: Vec<Plane>,
     /// The sensors.
     pub(super) sensors: Vec<u32>,
@@ -72,14 +72,15 @@ pub(super) struct WorldContacts {
     pub(super) strayed: Vec<u32>,
     /// The pairs whose boxes overlap.
     pub pairs: Pairs,
-    /// The colliders of each, the smaller index first.
+    /// The colliders of each pair, the smaller index first.
     keys: Vec<(u32, u32)>,
-    /// Colliders whose boxes overlap since this detection, likewise.
+    /// Colliders whose boxes began to overlap in this detection, likewise.
     found: Vec<(u32, u32)>,
-    /// Slots of manifolds whose pairs have ended, and pairs that are not as they were when [`WorldContacts::take_changes`] last told of them.
+    /// Slots of manifolds whose pairs have ended, and pairs that changed since the last
+    /// [`WorldContacts::take_changes`].
     ended: Vec<u32>,
     changed: Vec<PairChange>,
-    /// Whether other pairs may meet than before, so that all are predicted for.
+    /// Whether the set of pairs that can collide changed, so that the detection searches for all pairs.
     look_again: bool,
 }
 
@@ -101,7 +102,7 @@ crate::saved::cloned!(WorldContacts {
     look_again,
 } scratch { found, strayed });
 
-/// A pair, by its place, that is not as it was.
+/// A changed pair, by index.
 #[derive(Clone, Copy)]
 struct PairChange {
     pair: u32,
@@ -110,7 +111,7 @@ struct PairChange {
 
 crate::saved::fields!(PairChange { pair, computed });
 
-/// A half-space, and where it was when its pairs were looked for.
+/// A half-space, and its pose at the last search for its pairs.
 #[derive(Clone)]
 pub(super) struct Plane {
     pub(super) collider: u32,
@@ -119,7 +120,7 @@ pub(super) struct Plane {
 
 crate::saved::fields!(Plane { collider, then });
 
-/// How much larger than the shape a box in the tree is, relative to the shape's smallest half extent.
+/// Margin of a box in the tree, relative to the smallest half extent of the shape.
 const FAT: f32 = 0.1;
 
 impl WorldContacts {
@@ -152,7 +153,7 @@ impl WorldContacts {
         range
     }
 
-    /// Takes the colliders of a body out. Their pairs end with the next detection, and their places are free then.
+    /// Removes the colliders of a body. The next detection ends their pairs and frees their places.
     pub fn remove(&mut self, range: ColliderRange) {
         if range.count > 0 {
             self.colliders[range.places()].iter_mut().for_each(ColliderInfo::leave);
@@ -167,7 +168,7 @@ impl WorldContacts {
         &self.colliders[range.places()]
     }
 
-    /// The colliders with their places in the tree, as of the last detection; `range_of` gives those of a body.
+    /// The colliders with their places in the tree at the last detection. `range_of` returns those of a body.
     pub fn standing(&self, range_of: impl Fn(usize) -> ColliderRange) -> Standing<'_> {
         let place = |(c, i): (&ColliderInfo, u32)| {
             let first = if c.is_gone() { i } else { range_of(c.body as usize).first };
@@ -177,12 +178,12 @@ impl WorldContacts {
         Standing { tree: &self.tree, places, boxes: &self.fat }
     }
 
-    /// Looks for all pairs in the next detection, because other bodies are jointed.
+    /// Makes the next detection search for all pairs, because joints changed.
     pub fn look_again(&mut self) {
         self.look_again = true;
     }
 
-    /// Tells what changed since the last call; this is the world number `world`.
+    /// Reports changes since the last call. `world` is the number of this world.
     pub fn take_changes(&mut self, world: u32, tell: &mut dyn FnMut(Change)) {
         self.ended.drain(..).for_each(|slot| tell(Change::Ended(slot)));
         for PairChange { pair: i, computed } in self.changed.drain(..) {
@@ -193,14 +194,14 @@ impl WorldContacts {
         }
     }
 
-    /// Brings the pairs to where the bodies are.
+    /// Updates the pairs to the present poses.
     pub fn detect(&mut self, input: &DetectionInput) -> DetectStats {
         let parted = self.broad_phase(input);
         let stats = self.narrow_phase(input);
         DetectStats { reshaped: stats.reshaped | parted, ..stats }
     }
 
-    /// Finds new pairs and ends parted ones; returns whether an ended one had a contact.
+    /// Finds new pairs and ends separated ones. Returns whether an ended pair had a contact.
     fn broad_phase(&mut self, input: &DetectionInput) -> bool {
         let look_again = std::mem::take(&mut self.look_again);
         if !self.fatten(input) && !look_again {
@@ -223,7 +224,8 @@ impl WorldContacts {
         parted
     }
 
-    /// Gives a new fattened box to each collider that left its own; returns whether any did, or a half-space moved.
+    /// Gives a new fattened box to each collider that left its own. Returns whether a box changed or a half-space
+    /// moved.
     fn fatten(&mut self, input: &DetectionInput) -> bool {
         let fatten = |((c, fat), (moved, before)): ((&ColliderInfo, &mut Aabb), (&mut bool, &mut Aabb))| {
             *moved = false;
@@ -258,12 +260,12 @@ impl WorldContacts {
         any | !self.leaving.is_empty()
     }
 
-    /// Finds the pairs whose boxes overlap, and did not before: those that both overlapped have a pair. In the order of the bodies in
-    /// memory, in which every later stage then goes over them.
+    /// Finds the pairs whose boxes began to overlap. (Two boxes that both overlapped before have a pair.) The pairs are
+    /// in the order of the bodies in memory, which every later stage follows.
     fn find(&mut self, input: &DetectionInput) {
         let Self { colliders, fat, moved, before, tree, planes, found, .. } = self;
         let (fat, moved) = (&*fat, &*moved);
-        // Different bodies that meet, of which one can be pushed.
+        // Different bodies whose groups match, and contacts can push at least one of them.
         let may_touch = |i: u32, j: u32| {
             let bodies = key(colliders[i as usize].body, colliders[j as usize].body);
             let dynamic = |body: u32| input.kinds[body as usize] == BodyKind::Dynamic;
@@ -306,8 +308,8 @@ impl WorldContacts {
         }
     }
 
-    /// Ends the pairs whose boxes came apart or, if joints changed, whose bodies a joint holds; the last pair takes an ended one's place.
-    /// Returns whether an ended one had a contact.
+    /// Ends the pairs whose boxes came apart and, if joints changed, the pairs of jointed bodies. The last pair takes
+    /// the index of an ended one. Returns whether an ended pair had a contact.
     fn drop_parted(&mut self, input: &DetectionInput, joints_changed: bool) -> bool {
         let ends = |&(i, &(a, b)): &(usize, &(u32, u32))| {
             let jointed = |i: usize| input.jointed.contains(&key(self.pairs[i].body_a, self.pairs[i].body_b));
@@ -327,7 +329,7 @@ impl WorldContacts {
         self.ended.len() > before
     }
 
-    /// Begins the pairs that are new, the further reaching first.
+    /// Adds the new pairs. The collider with the larger reach comes first.
     fn add_found(&mut self) {
         let Self { colliders, pairs, keys, found, .. } = self;
         keys.extend(&*found);
@@ -349,14 +351,14 @@ impl WorldContacts {
     }
 }
 
-/// The box of a collider now: what it sweeps in this step, and the distance at which it makes contact.
+/// The box that a collider sweeps in this step, enlarged by the distance at which contacts begin.
 fn tight(c: &ColliderInfo, input: &DetectionInput) -> Aabb {
     let body = &input.moving[c.body as usize];
     let pose = Pose::from_parts(body.position, body.rotation);
     let mut aabb = c.aabb(pose).loosened(input.margins.speculative * c.size + input.margins.fall);
     let sweep = body.v * input.margins.dt;
-    // A collider that turns reaches no further out than from one side of the body to the other, and its box no further than its
-    // longest half diagonal.
+    // A turning collider reaches no further than from one side of the body to the other, and its box no further than
+    // its longest half diagonal.
     let most = c.reach - c.size + c.local.translation.length();
     aabb = aabb.loosened((c.reach * body.w.length() * input.margins.dt).min(most).max(0.0));
     aabb.mins += sweep.min(glam::Vec3::ZERO);
@@ -369,7 +371,7 @@ fn pose_of(c: &ColliderInfo, input: &DetectionInput) -> Pose {
     placed(Pose::from_parts(body.position, body.rotation), c.local)
 }
 
-/// Whether a box reaches a half-space at `pose`, by its corner that lies deepest.
+/// Whether the deepest corner of a box is below a half-space at `pose`.
 pub(super) fn box_reaches_plane(plane: &ColliderInfo, pose: Pose, aabb: &Aabb) -> bool {
     let Some(half_space) = plane.shape.as_halfspace() else { return false };
     let normal = pose.rotation * half_space.normal;

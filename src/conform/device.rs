@@ -1,4 +1,4 @@
-//! Limits, long plans and lost devices.
+//! Checks of limits, long plans and lost devices.
 
 use std::time::Duration;
 
@@ -18,17 +18,17 @@ use crate::random::SplitMix64;
 use crate::stats::median;
 use crate::world::{Body, BodyKind};
 
-/// Longest that a submission may hold a device. Watchdogs end work after two seconds and more.
+/// The longest time that a submission may hold a device. Watchdogs end work after two seconds or more.
 const LONGEST: Duration = Duration::from_millis(500);
 
-/// Steps that a pile of 27 boxes falls until its boxes touch.
+/// Steps until the boxes of a falling pile of 27 boxes touch.
 const LANDED: u32 = 60;
 
 async fn open(options: GpuOptions) -> Result<Box<dyn Backend>> {
     Ok(Box::new(Gpu::open_async(options).await?))
 }
 
-/// A pile that lies, small enough for one dispatch. Its boxes get velocities, so that contacts have more to do than to hold.
+/// A pile at rest, small enough for one dispatch. Its boxes get velocities, so that contacts do more than hold.
 async fn pile() -> Result<Warm> {
     let mut warm = Warm::of("pile", &["n=27"], LANDED).await?;
     let mut random = SplitMix64::new(3);
@@ -52,7 +52,7 @@ pub(super) async fn check_limits(run: &mut Run<'_>) {
     .await;
 }
 
-/// As many bodies as fit into a large buffer move for a step.
+/// Steps as many bodies as fit into a large buffer.
 async fn large_buffers(run: &mut Run<'_>) -> Outcome {
     let gpu = Gpu::open_async(run.gpu_options()).await?;
     let most = gpu.summary().buffer_limit.min(if run.options.short { 16 << 20 } else { 128 << 20 });
@@ -84,7 +84,7 @@ async fn large_buffers(run: &mut Run<'_>) -> Outcome {
     Ok(format!("{count} bodies in {mib} MiB, apart by {apart:.1e}"))
 }
 
-/// A step that the device of these options refuses in one line, and that the processor does instead.
+/// Checks that a device with these options refuses a step in one line, and that the processor then runs it.
 async fn refused(run: &mut Run<'_>, options: GpuOptions) -> Outcome {
     let mut warm = pile().await?;
     let (mut ours, mut theirs) = (warm.fork(Box::new(Reference::<f32>::new())), warm.fork(open(options).await?));
@@ -97,7 +97,7 @@ async fn refused(run: &mut Run<'_>, options: GpuOptions) -> Outcome {
     ours.step().await?;
     theirs.step().await?;
     same_worlds(&ours, &theirs)?;
-    // The device has room for the same step without these limits.
+    // Without these limits the device has room for the same step.
     let mut again = warm.fork(open(run.gpu_options()).await?);
     again.step().await?;
     near(run, &ours, &again)?;
@@ -146,7 +146,7 @@ pub(super) async fn check_long_plans(run: &mut Run<'_>) {
             same_worlds(&ours, &theirs)?;
         }
         let mut traffic = theirs.simulation.backend().traffic();
-        // The host measures: a machine with other work lets it wait now and then.
+        // The host measures the time: on a busy machine it sometimes waits.
         for _ in 0..4 {
             if traffic.longest_submission < LONGEST {
                 break;
@@ -161,11 +161,11 @@ pub(super) async fn check_long_plans(run: &mut Run<'_>) {
     .await;
 }
 
-/// Submissions, and whether the device is lost during each or after it.
+/// The submission, and whether the device is lost during it or after it.
 type Losses = &'static [(u32, bool)];
 
 pub(super) async fn check_losses(run: &mut Run<'_>) {
-    // The name of the check, the submission and the moment of each loss, and the backend that goes on.
+    // The name of the check, the submission and moment of each loss, and the backend that continues.
     let cases: [(&str, Losses, &str); 3] = [
         ("a device lost between two steps", &[(1, false)], "gpu"),
         ("a device lost during a step", &[(2, true)], "gpu"),
@@ -205,8 +205,9 @@ fn same_worlds(a: &Warm, b: &Warm) -> std::result::Result<(), Failure> {
     BodyDifference::first(&a.simulation.world, &b.simulation.world).map_or(Ok(()), |first| failed!("{first}"))
 }
 
-/// Fails unless a run is as near to the reference as few steps of plain WGSL are; the same bits in exact mode. The body in the middle counts:
-/// where surfaces just touch, rounding decides whether a contact is stiff or soft, and that concerns few bodies.
+/// Fails unless a run is as near to the reference as a few steps of plain WGSL; in exact mode it needs the same bits.
+/// The median body counts: if surfaces just touch, rounding decides whether a contact is stiff or soft, and that
+/// affects few bodies.
 fn near(run: &Run, ours: &Warm, theirs: &Warm) -> std::result::Result<(), Failure> {
     if run.is_exact() {
         return same_worlds(ours, theirs);

@@ -1,8 +1,8 @@
-//! How far apart two backends leave one problem: the rows that a backend gives back.
+//! Differences between the rows that two backends return for one problem.
 
 use crate::problem::StepProblem;
 
-/// Everything that a backend gives back, as numbers.
+/// All numbers that a backend returns.
 fn numbers(problem: &StepProblem) -> Vec<f32> {
     let c = &problem.convergence;
     let m = &problem.momentum;
@@ -25,12 +25,12 @@ fn pairs(a: &StepProblem, b: &StepProblem) -> impl Iterator<Item = (f32, f32)> {
     a.into_iter().zip(b)
 }
 
-/// How many numbers differ in any bit.
+/// Number of values that differ in any bit.
 pub fn differing(a: &StepProblem, b: &StepProblem) -> usize {
     pairs(a, b).filter(|(x, y)| x.to_bits() != y.to_bits()).count()
 }
 
-/// The largest difference of two numbers, relative to 1 plus their size; infinite if it is not a number.
+/// The largest difference of two values, relative to 1 plus their size; infinite for NaN.
 pub fn largest(a: &StepProblem, b: &StepProblem) -> f64 {
     let apart = |(x, y): (f32, f32)| {
         let (x, y) = (f64::from(x), f64::from(y));
@@ -40,7 +40,7 @@ pub fn largest(a: &StepProblem, b: &StepProblem) -> f64 {
     pairs(a, b).map(apart).fold(0.0, f64::max)
 }
 
-/// The largest difference of a component of a velocity [m/s] or an angular velocity [rad/s].
+/// The largest difference of a component of a velocity (m/s) or an angular velocity (rad/s).
 pub fn of_velocities(a: &StepProblem, b: &StepProblem) -> f64 {
     assert_eq!(a.bodies.len(), b.bodies.len());
     let velocities =

@@ -1,4 +1,4 @@
-//! Every kernel on random problems, against its double in Rust.
+//! Compares every kernel with its Rust twin on random problems.
 
 use super::difference::{differing, largest};
 use super::passes::{every_kernel, has_patches, ways_to_run};
@@ -11,7 +11,7 @@ use crate::problem::StepProblem;
 /// Variants of a kernel in a short run.
 const FEW: usize = 3;
 
-/// Scales of problems whose numbers, or their squares, are subnormal.
+/// Scales at which the numbers of a problem, or their squares, are subnormal.
 const TINY: [f32; 3] = [1e-20, 1e-22, 1e-40];
 
 pub(super) async fn check(run: &mut Run<'_>) {
@@ -33,20 +33,21 @@ pub(super) async fn check(run: &mut Run<'_>) {
             .into_iter()
             .flat_map(|patches| TINY.map(|scale| random::scaled(random::problem(0, patches), scale)))
             .collect();
-        // Variants differ in what they do, and hardly in the numbers.
+        // Variants differ in their operations, and hardly in the numbers.
         let few = |name: &&str| all.iter().find(|kernel| kernel.name() == *name).copied();
         let few: Vec<_> = ["solve_contacts", "solve_joints", "integrate_positions"].iter().filter_map(few).collect();
         run.check(Group::Kernels, "subnormal numbers", async |run| of_kernel(run, &few, &tiny).await).await;
     }
 }
 
-/// All variants, or some that lie evenly among them.
+/// All variants, or an even selection of them.
 fn some(run: &Run, all: Vec<Kernel>) -> Vec<Kernel> {
     let step = if run.options.short { all.len().div_ceil(FEW).max(1) } else { 1 };
     all.into_iter().step_by(step).collect()
 }
 
-/// Runs variants of a kernel on the device and on the reference, on those of the problems that have what each needs.
+/// Runs variants of a kernel on the device and on the reference, for each problem that has the data that the kernel
+/// needs.
 async fn of_kernel(run: &mut Run<'_>, kernels: &[Kernel], problems: &[StepProblem]) -> Outcome {
     let mut gpu = run.take_gpu().await?;
     let (mut worst, mut count) = (0.0_f64, 0);

@@ -1,4 +1,5 @@
-//! Whether an adapter and its driver are fit: kernels on random problems, scenes, limits, long plans, lost devices.
+//! Conformance tests of an adapter and its driver: kernels on random problems, scenes, limits, long plans, and lost
+//! devices.
 //!
 //! ```no_run
 //! use drystone::conform::{Check, Conformance, ConformOptions, Mode, Verdict, conform};
@@ -28,28 +29,29 @@ use crate::names::named;
 use crate::panics::text_of;
 use crate::stats::Stopwatch;
 
-/// Largest difference of a number after one kernel of plain WGSL, relative to 1 plus its size ([`difference::largest`]). Measured over
-/// 24 seeds on software Vulkan: 3.9e-6, a sweep of joints; five times that. An impulse of 0.1 that is one percent off: 9e-4.
+/// Largest difference of a number after one kernel of plain WGSL, relative to 1 plus its size
+/// ([`difference::largest`]). Over 24 seeds on software Vulkan, the largest measured value is 3.9e-6 for a sweep of
+/// joints; this is five times that. An impulse of 0.1 with an error of one percent gives 9e-4.
 pub const PLAIN_PASS: f64 = 2e-5;
 
-/// One step of plain WGSL, in the middle one of some moments: largest difference of a velocity (m/s) or angular velocity (rad/s).
-/// Measured on software Vulkan during the fall of a pile: up to 1.3e-6; eight times that. A step that lacks one sweep of one color:
-/// 2.4e-2.
+/// Largest difference of a velocity (m/s) or angular velocity (rad/s) after one step of plain WGSL, the median over
+/// some steps. On software Vulkan, the largest measured value is 1.3e-6 during the fall of a pile; this is eight times
+/// that. A step without one sweep of one color gives 2.4e-2.
 pub const PLAIN_STEP: f64 = 1e-5;
 
-/// What a check is about.
+/// The subject of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
 pub enum Group {
-    /// Every kernel on random problems, against its double in Rust.
+    /// Every kernel on random problems, against its Rust twin.
     Kernels,
-    /// Every scene of the catalogue, small and short, against the reference.
+    /// Every scene of the catalogue, in a small and short version, against the reference.
     Scenes,
     /// Large buffers, and problems beyond the limits of buffers and memory.
     Limits,
-    /// Plans that would hold the device for long.
+    /// Plans that would hold the device for a long time.
     LongDispatch,
-    /// Devices that are lost between and during steps.
+    /// Devices that are lost between or during steps.
     DeviceLost,
 }
 
@@ -61,25 +63,26 @@ named!(Group {
     DeviceLost = "device-lost",
 });
 
-/// How shaders reach the driver.
+/// The form in which the driver gets shaders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 pub enum Mode {
-    /// SPIR-V or WGSL whose arithmetic no driver can change ([`GpuOptions::exact`]): results are the reference's to the last bit.
+    /// SPIR-V or WGSL with arithmetic that no driver can change ([`GpuOptions::exact`]): results equal the reference to
+    /// the last bit.
     Exact,
-    /// Plain WGSL: results are near those of the reference.
+    /// Plain WGSL: results are near the reference.
     Plain,
 }
 
 named!(Mode { Exact = "exact", Plain = "plain", });
 
-/// What became of a check.
+/// The result of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "lowercase"))]
 pub enum Verdict {
-    /// The adapter does what it should.
+    /// The adapter works correctly.
     Passed,
-    /// It does not.
+    /// The adapter does not work correctly.
     Failed,
 }
 
@@ -89,32 +92,32 @@ named!(Verdict { Passed = "passed", Failed = "failed", });
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Check {
-    /// What it is about.
+    /// The subject of the check.
     pub group: Group,
-    /// How shaders reached the driver.
+    /// The form of the shaders.
     pub mode: Mode,
-    /// Kernel, scene, or what is asked of the device.
+    /// Name of the kernel or scene, or the requirement on the device.
     pub name: String,
-    /// What became of it.
+    /// The result.
     pub verdict: Verdict,
-    /// What was measured, or why it failed: one line.
+    /// The measurement, or the reason of a failure, in one line.
     pub figure: String,
-    /// How long it took (s).
+    /// Duration of the check (s).
     pub seconds: f64,
 }
 
-/// What to check.
+/// Selects the checks.
 #[derive(Clone, Debug)]
 pub struct ConformOptions {
-    /// The adapter, and faults on purpose. Each check sets `exact` and what it needs itself.
+    /// The adapter, and injected faults. Each check sets `exact` and other options as it needs.
     pub gpu: GpuOptions,
-    /// How shaders reach the driver.
+    /// The forms of shaders to check.
     pub modes: Vec<Mode>,
-    /// What the checks are about.
+    /// The subjects to check.
     pub groups: Vec<Group>,
-    /// Only checks whose name contains one of these; all if there are none.
+    /// Runs only checks whose name contains one of these; all checks if the list is empty.
     pub names: Vec<String>,
-    /// Fewer variants of kernels, fewer steps of scenes, smaller buffers.
+    /// Uses fewer variants of kernels, fewer steps of scenes, and smaller buffers.
     pub short: bool,
 }
 
@@ -135,13 +138,13 @@ pub struct Conformance {
 }
 
 impl Conformance {
-    /// How many checks have this verdict.
+    /// Number of checks with this verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
         self.checks.iter().filter(|check| check.verdict == verdict).count()
     }
 }
 
-/// Runs the checks that `options` name, and calls `each` after each.
+/// Runs the checks that `options` select, and calls `each` after each check.
 ///
 /// # Errors
 /// There is no such adapter, or it cannot be opened.
@@ -149,7 +152,7 @@ pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result
     block_on(conform_async(options, each))
 }
 
-/// As [`conform`], for a page: other tasks go on while the device works.
+/// Like [`conform`], for a web page: other tasks continue while the device works.
 ///
 /// ```no_run
 /// use drystone::conform::{Conformance, ConformOptions, conform_async};
@@ -161,7 +164,7 @@ pub fn conform(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result
 /// ```
 ///
 /// # Errors
-/// As of [`conform`].
+/// Those of [`conform`].
 pub async fn conform_async(options: &ConformOptions, each: &mut dyn FnMut(&Check)) -> Result<Conformance> {
     let adapter = Gpu::open_async(options.gpu.clone()).await?.summary().clone();
     let mut run = Run { options, mode: Mode::Plain, gpu: None, checks: Vec::new(), each };
@@ -181,8 +184,8 @@ pub async fn conform_async(options: &ConformOptions, each: &mut dyn FnMut(&Check
     Ok(Conformance { adapter, checks: run.checks })
 }
 
-/// A fault on purpose ([`Faults::shader`](crate::backend::gpu::Faults::shader)): accelerations, and the impulses that contacts apply, are one
-/// percent off. Checks of every group find it.
+/// An injected fault ([`Faults::shader`](crate::backend::gpu::Faults::shader)): accelerations, and the impulses that
+/// contacts apply, are one percent off. Checks of every group find it.
 ///
 /// ```no_run
 /// use drystone::conform::{ConformOptions, Verdict, conform, one_percent_off};
@@ -198,7 +201,7 @@ pub fn one_percent_off(_: &str, source: String) -> String {
     source.replace("point.r_b, contact.normal * change)", "point.r_b, contact.normal * (1.01 * change))")
 }
 
-/// Why a check failed, in words.
+/// The reason of a failure.
 struct Failure(String);
 
 impl From<Error> for Failure {
@@ -207,16 +210,16 @@ impl From<Error> for Failure {
     }
 }
 
-/// What a check measured, in words.
+/// The measurement of a check, or its failure.
 type Outcome = std::result::Result<String, Failure>;
 
-/// A [`Failure`] with a text as of `format!`.
+/// A [`Failure`] with a text, like `format!`.
 macro_rules! failed {
     ($($text:tt)*) => { Err($crate::conform::Failure(format!($($text)*))) };
 }
 use failed;
 
-/// What a future gives, or its panic.
+/// The result of a future, or its panic.
 async fn caught<T>(future: impl Future<Output = T>) -> std::thread::Result<T> {
     let mut future = pin!(future);
     std::future::poll_fn(|context| match catch_unwind(AssertUnwindSafe(|| future.as_mut().poll(context))) {
@@ -226,11 +229,11 @@ async fn caught<T>(future: impl Future<Output = T>) -> std::thread::Result<T> {
     .await
 }
 
-/// The checks that ran so far, and the device of the present mode.
+/// The completed checks, and the device of the present mode.
 struct Run<'a> {
     options: &'a ConformOptions,
     mode: Mode,
-    /// A device that compiled some kernels already; none before the first check and after one that failed.
+    /// A device that already compiled some kernels; `None` before the first check and after a failed one.
     gpu: Option<Box<dyn Backend>>,
     checks: Vec<Check>,
     each: &'a mut dyn FnMut(&Check),
@@ -246,7 +249,7 @@ impl Run<'_> {
         GpuOptions { exact: self.is_exact(), ..self.options.gpu.clone() }
     }
 
-    /// The device of the present mode. A check gives it back by [`Run::give_back`].
+    /// Takes the device of the present mode. A check returns it with [`Run::give_back`].
     async fn take_gpu(&mut self) -> Result<Box<dyn Backend>> {
         match self.gpu.take() {
             Some(gpu) => Ok(gpu),
@@ -258,7 +261,7 @@ impl Run<'_> {
         self.gpu = Some(gpu);
     }
 
-    /// Runs a check and notes its verdict. A panic of a driver's layer is a check that failed.
+    /// Runs a check and records its verdict. A panic in a driver's layer counts as a failed check.
     async fn check(&mut self, group: Group, name: &str, body: impl AsyncFnOnce(&mut Self) -> Outcome) {
         let names = &self.options.names;
         if !(names.is_empty() || names.iter().any(|part| name.contains(part.as_str()))) {

@@ -1,4 +1,4 @@
-//! Every kernel there is, and passes of one kernel.
+//! Every kernel, and passes with one kernel.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -8,7 +8,7 @@ use crate::kernels::Rules;
 use crate::plan::{Kernel, Pass};
 use crate::problem::StepProblem;
 
-/// Every combination of rules that differ in what they do.
+/// Every combination of rules that makes a difference.
 pub fn every_rules() -> Vec<Rules> {
     let mut all = Vec::new();
     for friction in [FrictionRule::None, FrictionRule::Slip, FrictionRule::Box, FrictionRule::Disc] {
@@ -21,7 +21,7 @@ pub fn every_rules() -> Vec<Rules> {
                 friction_first: has(2),
                 accumulated: has(3),
                 round: has(4),
-                // Meets each of the others on both sides.
+                // Combines with both values of each of the other rules.
                 as_one: has(0) ^ has(1) ^ has(4),
                 measured: has(5),
                 driven: has(6),
@@ -31,11 +31,11 @@ pub fn every_rules() -> Vec<Rules> {
                 bounces: has(4),
                 axes: false,
             };
-            // Velocities since the start of the step meet every sum of velocities without the rules below.
+            // Velocities since the start of the step are combined with every sum of velocities without the rules below.
             let plain = rules.accumulated && !(rules.friction_first || rules.round || rules.measured || rules.driven);
-            // Equal moments of inertia meet every impulse without the rules above.
-            // Without friction it does not matter when it acts. Belts drive points only; with them, and with repeated passes,
-            // the rest of the rules is not tried again.
+            // Equal moments of inertia are combined with every impulse without the rules above. Without friction,
+            // `friction_first` makes no difference. Belts drive only points. Belts and repeated passes are not combined with all other
+            // rules again.
             let drivable = matches!(friction, FrictionRule::Box | FrictionRule::Disc)
                 && rules.accumulated
                 && !(rules.patch || rules.round || rules.measured);
@@ -51,7 +51,7 @@ pub fn every_rules() -> Vec<Rules> {
     all
 }
 
-/// Every kernel under every combination of rules.
+/// Every kernel with every combination of rules.
 pub fn every_kernel() -> Vec<Kernel> {
     let mut all = vec![
         Kernel::IntegrateVelocities { warm_start: false, from_start: false },
@@ -105,12 +105,12 @@ pub fn sweep() -> Kernel {
     Kernel::SolveContacts(Rules { biased: true, friction: FrictionRule::Disc, round: true, ..Rules::default() })
 }
 
-/// Whether `kernel` asks for manifolds that carry a patch.
+/// Whether `kernel` needs manifolds with a patch.
 pub fn has_patches(kernel: Kernel) -> bool {
     kernel.rules().is_some_and(|rules| rules.patch)
 }
 
-/// The colors that `kernel` goes over; none for one that goes over something else.
+/// The colors that `kernel` processes; an empty range for a kernel that does not work by color.
 fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
     let [contacts, joints, bodies, inertias, systems, turning] = problem.blocks[0].colors();
     match kernel {
@@ -140,7 +140,7 @@ pub fn in_one_pass(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
     vec![Pass { kernel, block: 0, colors: colors_of(kernel, problem) }]
 }
 
-/// Sweeps of the points and the joints of a problem that end with what comes between accelerated ones, several times.
+/// Several sweeps of the points and the joints of a problem. Each ends with the kernels between accelerated sweeps.
 pub fn accelerated_sweeps(problem: &StepProblem, measured: bool) -> Vec<Pass> {
     let between = [Kernel::MeasureStep, Kernel::UpdateMomentum];
     let sweep = |first| {
@@ -150,7 +150,7 @@ pub fn accelerated_sweeps(problem: &StepProblem, measured: bool) -> Vec<Pass> {
     [true, false, false, false, false].into_iter().flat_map(sweep).collect()
 }
 
-/// `kernel` over all of `problem`, one color a pass.
+/// `kernel` over all of `problem`, one color in each pass.
 pub fn color_by_color(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
     let colors = colors_of(kernel, problem);
     if colors.is_empty() {
@@ -159,10 +159,10 @@ pub fn color_by_color(kernel: Kernel, problem: &StepProblem) -> Vec<Pass> {
     colors.map(|c| Pass { kernel, block: 0, colors: c..c + 1 }).collect()
 }
 
-/// What a kernel is run as: over all colors in one pass, and color by color; with a sweep after it if it writes rows that
-/// are not read back.
+/// The sequences of passes that test a kernel: all colors in one pass, and color by color. If the kernel writes rows
+/// that are not read back, a sweep follows.
 pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
-    // What one leaves for the next is not read back.
+    // Data that one kernel leaves for the next is not read back.
     match kernel {
         Kernel::Extrapolate { measured, .. } => return vec![accelerated_sweeps(problem, measured)],
         Kernel::MeasureStep | Kernel::UpdateMomentum => return vec![accelerated_sweeps(problem, false)],
@@ -176,7 +176,7 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());
     }
-    // Systems of joints: what one of these kernels leaves to the next is not read back.
+    // Systems of joints: data that one of these kernels leaves for the next is not read back.
     if let Kernel::MeasureJoints(rules) | Kernel::SolveJointSystems(rules) | Kernel::ApplyJointChanges(rules) = kernel {
         let sweep = system_sweep(rules, problem);
         let changes = [Kernel::BeginChanges, Kernel::EndChanges].map(|kernel| in_one_pass(kernel, problem));
@@ -186,12 +186,12 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     if matches!(kernel, Kernel::TurnInertias | Kernel::BeginSystems) {
         return vec![system_sweep(Rules::default(), problem)];
     }
-    // A warm start applies the impulses since it last ran.
+    // A warm start applies the impulses since the last warm start.
     if kernel == (Kernel::IntegrateVelocities { warm_start: true, from_start: false }) {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &color_by_color(sweep(), problem), &passes[..]].concat());
     }
-    // Changes are those since `BeginChanges`, and only their sums with the velocities from then stay.
+    // Changes count from `BeginChanges`, and only their sums with the velocities at that time remain.
     if kernel.is_from_start() || kernel == Kernel::EndChanges {
         let integrate = Kernel::IntegrateVelocities { warm_start: false, from_start: true };
         let first = [Kernel::BeginChanges, integrate].map(|kernel| in_one_pass(kernel, problem)).concat();
@@ -202,7 +202,8 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     ways
 }
 
-/// Bodies move, and the joints of all systems are factored and solved twice: a second time at corrections that the first left.
+/// Moves bodies, then factors the joints of all systems and solves them twice: the second time at the corrections that
+/// the first one left.
 fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
     let (turn, factor) = (Kernel::TurnInertias, Kernel::BeginSystems);
     let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };

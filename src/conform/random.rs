@@ -1,4 +1,4 @@
-//! Random problems: every row is valid, no two make a scene.
+//! Random problems. Every row is valid, but the rows do not form a scene.
 #![allow(clippy::field_reassign_with_default)]
 
 use glam::{Mat3, Quat, Vec3};
@@ -12,7 +12,7 @@ use crate::problem::{
 };
 use crate::random::SplitMix64;
 
-/// SplitMix64, with the numbers that problems need.
+/// SplitMix64 with the distributions that problems need.
 pub struct Random(SplitMix64);
 
 impl Random {
@@ -31,7 +31,7 @@ impl Random {
         (self.bits() % u64::from(end)) as u32
     }
 
-    /// Whether something of `chance` in 1 happens.
+    /// Returns true with the probability `chance`.
     pub fn happens(&mut self, chance: f32) -> bool {
         self.within(0.0, 1.0) < chance
     }
@@ -46,14 +46,14 @@ impl Random {
         Vec3::from_array([(); 3].map(|()| self.within(-size, size)))
     }
 
-    /// A rotation; any may come, and not all as often.
+    /// A random rotation, not uniformly distributed.
     pub fn rotation(&mut self) -> Quat {
         let q = Quat::from_array([(); 4].map(|()| self.within(-1.0, 1.0)));
         if q.length() > 0.1 { q.normalize() } else { Quat::IDENTITY }
     }
 }
 
-/// Bodies of a random problem. Every fifth cannot move.
+/// Bodies of a random problem. One in five cannot move.
 const BODIES: u32 = 200;
 /// Contacts of a random problem: some of its colors are then larger than a workgroup.
 const CONTACTS: u32 = 600;
@@ -202,8 +202,8 @@ pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
     problem
 }
 
-/// The same problem with spins `factor` times as fast, and moments of inertia of other ratios: some of a solid, some up to
-/// 1:1000.
+/// The same problem with spins `factor` times as fast, and moments of inertia with other ratios: some are those of a
+/// solid, others go up to 1:1000.
 pub fn faster(mut problem: StepProblem, factor: f32) -> StepProblem {
     problem.bodies.iter_mut().flat_map(|row| &mut row.w).for_each(|w| *w *= factor);
     for (k, row) in problem.inertias.iter_mut().enumerate() {
@@ -238,7 +238,7 @@ fn params(problem: &StepProblem, patches: bool) -> Params {
     params
 }
 
-/// The bodies of `count` random constraints in color order, and where each color begins and the last ends.
+/// The bodies of `count` random constraints in color order, and the start of each color and the end of the last.
 fn colored(random: &mut Random, count: u32) -> (Vec<[u32; 2]>, Coloring) {
     let pairs: Vec<_> = (0..count).map(|_| random_pair(random)).collect();
     let place = |body: u32| if is_movable(body) { body } else { IMMOVABLE };
@@ -306,7 +306,7 @@ fn contact_row(random: &mut Random, [body_a, body_b]: [u32; 2], first_point: u32
 }
 
 fn point_row(random: &mut Random, patches: bool) -> PointRow {
-    // A direction of slip, or a distance from the patch.
+    // A slip direction, or a distance from the patch.
     let (sin, cos) = random.within(0.0, std::f32::consts::TAU).sin_cos();
     let [slip_1, slip_2] = if patches { [sin.abs(), 0.0] } else { [sin, cos] };
     PointRow {
@@ -321,7 +321,7 @@ fn point_row(random: &mut Random, patches: bool) -> PointRow {
     }
 }
 
-/// The impulse of a point, or of a patch: the one pushes, the other twists either way.
+/// The impulse of a point, which pushes, or of a patch, which twists in either direction.
 fn impulse_row(random: &mut Random, patch: bool) -> ImpulseRow {
     let least = if patch { -2.0 } else { 0.0 };
     let normal = if random.happens(0.3) { 0.0 } else { random.within(least, 2.0) };
@@ -339,7 +339,7 @@ fn joint_row(random: &mut Random, [body_a, body_b]: [u32; 2]) -> JointRow {
     row
 }
 
-/// A lock, a limit, a motor or a spring, along or about any direction, and its impulse.
+/// A lock, a limit, a motor or a spring in a random direction, and its impulse.
 fn axis_row(random: &mut Random) -> (AxisRow, f32) {
     let mut row = AxisRow::default();
     row.direction = (random.rotation() * Vec3::X).to_array();

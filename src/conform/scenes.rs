@@ -1,4 +1,4 @@
-//! Every scene of the catalogue, small and short, against the reference.
+//! Compares every scene of the catalogue, in a small and short version, with the reference.
 
 use super::difference::of_velocities;
 use super::{Group, Outcome, Run, failed};
@@ -11,7 +11,7 @@ use crate::scenes::{CATALOGUE, Scene, Spawners};
 use crate::simulation::Simulation;
 use crate::stats::{largest, median};
 
-/// Parameters of scenes that are large without them.
+/// Smaller parameters for scenes that are large by default.
 const SMALL: [(&str, &[&str]); 14] = [
     ("pile", &["n=64"]),
     ("pile-mixed", &["n=64"]),
@@ -29,12 +29,13 @@ const SMALL: [(&str, &[&str]); 14] = [
     ("card-house", &["storeys=2"]),
 ];
 
-/// Largest difference of a velocity of single steps of plain WGSL, relative to the largest speed, in the middle one of some steps. Measured on
-/// software Vulkan over the catalogue: up to 6.8e-6, of boxes that tumble in a drum; seven times that. Contacts whose impulses are one percent off:
-/// 2.5e-4 for a chain, 8e-4 and more for piles.
+/// Largest difference of a velocity after single steps of plain WGSL, relative to the largest speed; the median over
+/// some steps. On software Vulkan, the largest measured value over the catalogue is 6.8e-6, for boxes that tumble in a
+/// drum; this is seven times that. Contacts with impulses that are one percent off give 2.5e-4 for a chain, and 8e-4 or
+/// more for piles.
 const PLAIN_SCENE: f64 = 5e-5;
 
-/// A scene that ran on the processor for a while, so that bodies touch.
+/// A scene that ran on the processor until bodies touch.
 pub(super) struct Warm {
     pub simulation: Simulation,
     spawners: Spawners,
@@ -42,7 +43,7 @@ pub(super) struct Warm {
 }
 
 impl Warm {
-    /// Runs a scene for so many steps.
+    /// Runs a scene for `steps` steps.
     pub async fn of(name: &str, parameters: &[&str], steps: u32) -> Result<Self> {
         let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
         let scene = Scene::find(name, &parameters)?;
@@ -56,18 +57,18 @@ impl Warm {
         Ok(warm)
     }
 
-    /// The same from here on another backend.
+    /// Continues from here on another backend.
     pub fn fork(&mut self, backend: Box<dyn Backend>) -> Self {
         Self { simulation: self.simulation.fork(backend), spawners: self.spawners.clone(), dt: self.dt }
     }
 
-    /// One step; returns the line of a device that was lost.
+    /// Makes one step. Returns the message if a device was lost.
     pub async fn step(&mut self) -> Result<Option<String>> {
         self.spawners.before_step(&mut self.simulation.world, self.dt);
         Ok(self.simulation.step_async(self.dt).await?.fault)
     }
 
-    /// Takes the backend back.
+    /// Returns the backend.
     fn into_backend(mut self) -> Box<dyn Backend> {
         self.simulation.set_backend(Box::new(Cpu::new()))
     }
@@ -85,7 +86,7 @@ pub(super) async fn check(run: &mut Run<'_>) {
     }
 }
 
-/// Steps one after another, which have the bits of the reference.
+/// Checks consecutive steps. They must have the bits of the reference.
 async fn of_steps(run: &mut Run<'_>, mut warm: Warm) -> Outcome {
     let steps = if run.options.short { 8 } else { 40 };
     let (mut ours, gpu) = (warm.fork(Box::new(Reference::<f32>::new())), run.take_gpu().await?);
@@ -105,7 +106,7 @@ async fn of_steps(run: &mut Run<'_>, mut warm: Warm) -> Outcome {
     Ok(format!("{bodies} bodies, {steps} steps, the same bits"))
 }
 
-/// Single steps, each from the state of the reference, because trajectories part.
+/// Checks single steps, each from the state of the reference, because trajectories diverge.
 async fn of_single_steps(run: &mut Run<'_>, mut ours: Warm) -> Outcome {
     let moments = if run.options.short { 3 } else { 9 };
     let mut gpu = run.take_gpu().await?;

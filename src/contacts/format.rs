@@ -1,4 +1,4 @@
-//! Contact problems as text: docs/contacts-format.md.
+//! Contact problems as text: see docs/contacts-format.md.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::error::{Error, Result, ensure, input};
 /// The first bytes of an HDF5 file.
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// A file of text or HDF5.
+/// Reads a file of text or HDF5.
 fn read<T>(path: &Path, fclib: fn(Vec<u8>) -> Result<T>, text: fn(&str) -> Result<T>) -> Result<T> {
     let bytes = std::fs::read(path).map_err(Error::file(path))?;
     let problem = if bytes.starts_with(HDF5_SIGNATURE) {
@@ -24,17 +24,18 @@ fn read<T>(path: &Path, fclib: fn(Vec<u8>) -> Result<T>, text: fn(&str) -> Resul
 }
 
 impl Problem {
-    /// From a file: text, or FCLIB's HDF5 in global or local form.
+    /// Reads a file: text, or FCLIB's HDF5 in global or local form.
     ///
     /// # Errors
-    /// It cannot be read, or is not a contact problem; names the file, and line or dataset and value.
+    /// The file cannot be read, or is not a contact problem. The message names the file, and the line or dataset with
+    /// its value.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         read(path.as_ref(), Self::from_fclib, |text| ContactProblem::parse(text).map(Self::Bodies))
     }
 }
 
 impl ContactProblem {
-    /// From a file: text, or FCLIB's HDF5.
+    /// Reads a file: text, or FCLIB's HDF5.
     ///
     /// ```
     /// let missing = drystone::ContactProblem::read("no such file").expect_err("there is none");
@@ -42,15 +43,16 @@ impl ContactProblem {
     /// ```
     ///
     /// # Errors
-    /// It cannot be read, or is not a contact problem; names the file, and line or dataset and value.
+    /// The file cannot be read, or is not a contact problem. The message names the file, and the line or dataset with
+    /// its value.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         read(path.as_ref(), Self::from_fclib, Self::parse)
     }
 
-    /// From text.
+    /// Reads text.
     ///
     /// # Errors
-    /// It is not a contact problem; names line and value.
+    /// The text is not a contact problem. The message names the line and the value.
     pub fn parse(text: &str) -> Result<Self> {
         let mut reader = Reader { lines: text.lines(), line: 0 };
         let mut problem = Self::default();
@@ -74,7 +76,7 @@ impl ContactProblem {
         Ok(problem)
     }
 
-    /// As text; every number is read back to the same bits.
+    /// Writes text. Reading it gives every number with the same bits.
     pub fn to_text(&self) -> String {
         let name = self.name.replace(char::is_control, " ");
         let name = name.trim();
@@ -83,7 +85,7 @@ impl ContactProblem {
         let mut row = |head: String, numbers: &[f64]| {
             text.push_str(&head);
             for x in numbers {
-                // Shortest text that is read back to the same bits.
+                // The shortest text from which the same bits are read.
                 write!(text, " {x:?}").expect("a string takes everything");
             }
             text.push('\n');
@@ -126,7 +128,7 @@ fn contact(f: &mut Fields, bodies: u32) -> Result<PointContact> {
     Ok(PointContact { a, b, friction, offset, frame, r_a: f.vector("arm of a")?, r_b: f.vector("arm of b")? })
 }
 
-/// The lines of a text, counted.
+/// The lines of a text, with their numbers.
 struct Reader<'a> {
     lines: Lines<'a>,
     line: usize,
@@ -139,7 +141,7 @@ impl<'a> Reader<'a> {
         self.lines.next().ok_or_else(end)
     }
 
-    /// A line that begins with `head`, all of whose fields `take` takes.
+    /// A line that begins with `head`. `take` has to read all its fields.
     fn row<T>(&mut self, head: &str, take: impl FnOnce(&mut Fields) -> Result<T>) -> Result<T> {
         let mut fields = Fields { words: self.next(&format!("{head:?}"))?.split_whitespace() };
         let taken = fields.word(head).and_then(|()| take(&mut fields)).and_then(|row| match fields.words.next() {
@@ -149,7 +151,7 @@ impl<'a> Reader<'a> {
         taken.map_err(|e| e.within(format!("line {}", self.line)))
     }
 
-    /// Nothing but blank lines follows.
+    /// Only blank lines may follow.
     fn end(mut self) -> Result<()> {
         match self.lines.by_ref().inspect(|_| self.line += 1).find(|line| !line.trim().is_empty()) {
             Some(line) => Err(input!("line {}: {} after the last contact", self.line, quoted(line))),
@@ -158,10 +160,10 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Characters of a file that a message quotes.
+/// Largest number of characters of a file that a message quotes.
 const MOST_QUOTED: usize = 80;
 
-/// The text in quotes, or its beginning: a file may be anything.
+/// The text in quotes, or only its beginning: a file can have any content.
 fn quoted(text: &str) -> String {
     match text.char_indices().nth(MOST_QUOTED) {
         Some((end, _)) => format!("{:?}...", &text[..end]),
@@ -206,7 +208,7 @@ impl Fields<'_> {
         self.numbers(what).map(DVec3::from_array)
     }
 
-    /// Index of a body; none for -1.
+    /// Index of a body, or `None` for -1.
     fn body(&mut self, what: &str, bodies: u32) -> Result<Option<u32>> {
         match self.take::<i64>(what)? {
             -1 => Ok(None),

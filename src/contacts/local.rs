@@ -1,10 +1,10 @@
-//! A contact problem without bodies: how the relative velocities at its contacts answer to their impulses.
+//! A contact problem without bodies: the relative velocities at its contacts as functions of their impulses.
 
 use glam::{DMat3, DVec3};
 
-/// u = W r + q, with W in blocks of contacts; the conditions on r and u are those of [`super::ContactProblem`].
+/// u = W r + q, with W in blocks of contacts. The conditions on r and u are those of [`super::ContactProblem`].
 ///
-/// W need not be symmetric: files of some programs differ from their transpose by a thousandth.
+/// W need not be symmetric: in files of some programs it differs from its transpose by a thousandth.
 ///
 /// ```
 /// use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
@@ -19,10 +19,11 @@ pub struct LocalProblem {
     pub name: String,
     /// Coulomb coefficient of each contact.
     pub friction: Vec<f64>,
-    /// q: the relative velocity at each contact without impulses, in its coordinates: normal, first and second tangent (m/s).
+    /// q: the relative velocity at each contact without impulses (m/s), in the coordinates of the contact: normal,
+    /// first and second tangent.
     pub free: Vec<DVec3>,
-    /// The rows of W (1/kg): for each contact the contacts that it answers to, ascending, each with its block. Every contact
-    /// answers to itself.
+    /// The rows of W (1/kg). For each contact it lists the contacts whose impulses affect it, in ascending order, each
+    /// with its block. Every row has its own contact.
     pub rows: Vec<Vec<(u32, DMat3)>>,
 }
 
@@ -30,19 +31,19 @@ impl LocalProblem {
     /// W_ii (1/kg).
     ///
     /// # Panics
-    /// The contact does not answer to itself.
+    /// The row does not have its own contact.
     pub fn block(&self, contact: usize) -> DMat3 {
         let row = &self.rows[contact];
         row[row.binary_search_by_key(&(contact as u32), |e| e.0).expect("a contact answers to itself")].1
     }
 
-    /// W r at a contact (m/s), of impulses in the coordinates of their contacts (N s).
+    /// W r at a contact (m/s), for impulses in the coordinates of their contacts (N s).
     pub fn response(&self, contact: usize, impulses: &[DVec3]) -> DVec3 {
         self.rows[contact].iter().fold(DVec3::ZERO, |u, &(j, w)| u + w * impulses[j as usize])
     }
 
-    /// Contacts in colors: in the order of the file each takes the first color that has no contact which it answers to, or which
-    /// answers to it.
+    /// Colors the contacts: in file order, each contact takes the first color without a contact that is coupled to it
+    /// in either direction.
     pub fn colors(&self) -> Vec<Vec<u32>> {
         let mut near: Vec<Vec<u32>> = vec![Vec::new(); self.rows.len()];
         for (i, row) in (0..).zip(&self.rows) {

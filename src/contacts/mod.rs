@@ -1,6 +1,6 @@
-//! One contact problem by itself, at the level of velocities and in f64: what a solver sees after detection.
+//! One contact problem at the level of velocities, in f64: the input of a solver after detection.
 //!
-//! With J the rows of all contacts and M the masses, a solver looks for impulses r so that
+//! Let J be the rows of all contacts and M the masses. A solver computes impulses r so that
 //!
 //! ```text
 //! v = v_free + M⁻¹ Jᵀ r        u = J v + w        for each contact, with r = (r_n, r_t) and u = (u_n, u_t):
@@ -8,8 +8,9 @@
 //! |r_t| <= mu r_n,  r_t = -mu r_n u_t/|u_t| where |u_t| > 0                       Coulomb
 //! ```
 //!
-//! The rows are those of docs/derivation.md, sections 2 and 6. As text: docs/contacts-format.md; as HDF5: FCLIB's global form.
-//! FCLIB's local form has u = W r + q in place of the first line: [`LocalProblem`].
+//! The rows are those of docs/derivation.md, sections 2 and 6. The text format is described in docs/contacts-format.md.
+//! The HDF5 format is FCLIB's global form. FCLIB's local form has u = W r + q in place of the first line:
+//! [`LocalProblem`].
 
 #[cfg(feature = "fclib")]
 mod fclib;
@@ -23,7 +24,7 @@ pub use operator::Operator;
 
 use glam::{DMat3, DVec3};
 
-/// Bodies that may move, and their contacts with each other and with what is fixed.
+/// Movable bodies, and their contacts with each other and with fixed bodies.
 ///
 /// ```
 /// use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -34,7 +35,7 @@ use glam::{DMat3, DVec3};
 /// let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
 /// let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
 /// let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
-/// // As text, and back.
+/// // Convert to text and back.
 /// assert_eq!(ContactProblem::parse(&problem.to_text())?, problem);
 /// # Ok::<(), drystone::Error>(())
 /// ```
@@ -42,13 +43,13 @@ use glam::{DMat3, DVec3};
 pub struct ContactProblem {
     /// Its name, on one line.
     pub name: String,
-    /// The bodies that can move.
+    /// The movable bodies.
     pub bodies: Vec<FreeBody>,
-    /// Their contacts, one a point.
+    /// Their contacts, each with one point.
     pub contacts: Vec<PointContact>,
 }
 
-/// A body that can move.
+/// A movable body.
 ///
 /// ```
 /// use drystone::{contacts::{FreeBody, Velocity}, glam::{DMat3, DVec3}};
@@ -63,11 +64,11 @@ pub struct FreeBody {
     pub mass: f64,
     /// Inertia about the center of mass, world axes (kg m²).
     pub inertia: DMat3,
-    /// How it would move at the end of the step without contacts, all forces included.
+    /// Its velocity at the end of the step without contacts, including all forces.
     pub free: Velocity,
 }
 
-/// How a body moves.
+/// Linear and angular velocity of a body.
 ///
 /// ```
 /// use drystone::contacts::Velocity;
@@ -76,13 +77,13 @@ pub struct FreeBody {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Velocity {
-    /// Of the center of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub linear: DVec3,
-    /// World axes (rad/s).
+    /// Angular velocity in world axes (rad/s).
     pub angular: DVec3,
 }
 
-/// One point at which two bodies touch.
+/// One contact point between two bodies.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -93,27 +94,28 @@ pub struct Velocity {
 /// # let (offset, r_a, r_b) = (DVec3::ZERO, DVec3::ZERO, DVec3::Y * -0.5);
 /// # let contact = PointContact { a: None, b: Some(0), friction: 0.1, offset, frame, r_a, r_b };
 /// # let problem = ContactProblem { name: "a ball".into(), bodies: vec![ball], contacts: vec![contact] };
-/// // The first coordinate is that of the normal.
+/// // The first coordinate is along the normal.
 /// let r = contact.coordinates(DVec3::Y * 6.0);
 /// assert_eq!((r, contact.impulse(r)), (DVec3::X * 6.0, DVec3::Y * 6.0));
 /// # let _ = problem;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointContact {
-    /// The body that the normal points away from; none if it is fixed.
+    /// The body that the normal points away from, or `None` if it is fixed.
     pub a: Option<u32>,
-    /// The body that the normal points to; none if it is fixed.
+    /// The body that the normal points to, or `None` if it is fixed.
     pub b: Option<u32>,
     /// Coulomb coefficient mu.
     pub friction: f64,
-    /// Added to the relative velocity, in the contact's coordinates: restitution, gap over step length (m/s).
+    /// A velocity that is added to the relative velocity, in the contact's coordinates (m/s): restitution, or gap
+    /// divided by step length.
     pub offset: DVec3,
-    /// The coordinates of the contact: unit normal from a to b, first and second tangent, world axes. Tangents are used
-    /// as they are, whether or not they are orthonormal.
+    /// The coordinate axes of the contact: unit normal from a to b, first and second tangent, in world axes. Tangents
+    /// are used unchanged, even if they are not orthonormal.
     pub frame: [DVec3; 3],
-    /// From the center of mass of a to the point, world axes (m); of no effect if a is fixed.
+    /// From the center of mass of a to the point, in world axes (m); without effect if a is fixed.
     pub r_a: DVec3,
-    /// From the center of mass of b to the point, world axes (m); of no effect if b is fixed.
+    /// From the center of mass of b to the point, in world axes (m); without effect if b is fixed.
     pub r_b: DVec3,
 }
 
@@ -123,7 +125,7 @@ impl PointContact {
         DVec3::from_array(self.frame.map(|d| d.dot(x)))
     }
 
-    /// The impulse on b (N s), world axes, that belongs to coordinates `r`.
+    /// The impulse on b in world axes (N s) with the coordinates `r`.
     pub fn impulse(&self, r: DVec3) -> DVec3 {
         self.frame[0] * r.x + self.frame[1] * r.y + self.frame[2] * r.z
     }
@@ -150,14 +152,14 @@ impl PointContact {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Problem {
-    /// With its bodies.
+    /// A problem with bodies.
     Bodies(ContactProblem),
-    /// Without them: W in blocks of contacts.
+    /// A problem without bodies: W in blocks of contacts.
     Blocks(LocalProblem),
 }
 
 #[cfg(not(feature = "fclib"))]
-const NO_HDF5: &str = "an HDF5 file: drystone was built without the feature fclib, which reads it";
+const NO_HDF5: &str = "an HDF5 file: drystone was built without the feature fclib, which is needed to read it";
 
 #[cfg(not(feature = "fclib"))]
 impl ContactProblem {
@@ -173,7 +175,7 @@ impl Problem {
     }
 }
 
-/// Whether every direction has energy: the pivots of the elimination of a symmetric matrix are positive.
+/// Whether a symmetric matrix is positive definite: all pivots of its elimination are positive.
 fn is_positive_definite(m: DMat3) -> bool {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = m.to_cols_array_2d();
     let (p_yy, p_yz, p_zz) = (yy - xy * xy / xx, yz - xy * xz / xx, zz - xz * xz / xx);

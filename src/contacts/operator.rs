@@ -1,10 +1,10 @@
-//! From impulses to velocities: v = v_free + M⁻¹ Jᵀ r and u = J v + w, in f64.
+//! Computes velocities from impulses: v = v_free + M⁻¹ Jᵀ r and u = J v + w, in f64.
 
 use glam::{DMat3, DVec3};
 
 use super::{ContactProblem, Velocity};
 
-/// A problem with the inverse of its masses.
+/// A problem with the inverses of its masses.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -22,7 +22,7 @@ use super::{ContactProblem, Velocity};
 /// // 6 N s stop 2 kg at 3 m/s.
 /// let velocities = operator.velocities(&[DVec3::X * 6.0]);
 /// assert_eq!(operator.relative_velocity(0, &velocities), DVec3::Z);
-/// // How u answers to r: 1/m along the normal, and an arm of 0.5 m on 1 kg m² along the tangents.
+/// // The response of u to r: 1/m along the normal, and an arm of 0.5 m on 1 kg m² along the tangents.
 /// assert_eq!(operator.block(0), DMat3::from_diagonal(DVec3::new(0.5, 0.75, 0.75)));
 /// assert_eq!(operator.inverse_inertia(0), DMat3::IDENTITY);
 /// ```
@@ -34,7 +34,7 @@ pub struct Operator<'a> {
 }
 
 impl<'a> Operator<'a> {
-    /// Of a problem.
+    /// The operator of a problem.
     pub fn new(problem: &'a ContactProblem) -> Self {
         Self { problem, inverse_inertia: problem.bodies.iter().map(|b| inverse(b.inertia)).collect() }
     }
@@ -49,10 +49,11 @@ impl<'a> Operator<'a> {
         self.inverse_inertia[body]
     }
 
-    /// The velocity of each body under the impulses of all contacts, each in its contact's coordinates (N s).
+    /// The velocity of each body under the impulses of all contacts. Each impulse is in the coordinates of its contact
+    /// (N s).
     ///
     /// # Panics
-    /// There is not one impulse a contact.
+    /// The number of impulses differs from the number of contacts.
     pub fn velocities(&self, impulses: &[DVec3]) -> Vec<Velocity> {
         assert_eq!(impulses.len(), self.problem.contacts.len(), "one impulse a contact");
         let mut velocities: Vec<_> = self.problem.bodies.iter().map(|b| b.free).collect();
@@ -68,7 +69,7 @@ impl<'a> Operator<'a> {
         velocities
     }
 
-    /// The relative velocity u at a contact, offset included, in its coordinates (m/s).
+    /// The relative velocity u at a contact, offset included, in the contact's coordinates (m/s).
     pub fn relative_velocity(&self, contact: usize, velocities: &[Velocity]) -> DVec3 {
         let contact = &self.problem.contacts[contact];
         let at = |body: Option<u32>, arm: DVec3| {
@@ -77,7 +78,7 @@ impl<'a> Operator<'a> {
         contact.coordinates(at(contact.b, contact.r_b) - at(contact.a, contact.r_a)) + contact.offset
     }
 
-    /// The block W_ii of W = J M⁻¹ Jᵀ (1/kg): how u at a contact answers to the contact's own impulse.
+    /// The block W_ii of W = J M⁻¹ Jᵀ (1/kg): the response of u at a contact to the impulse of the same contact.
     pub fn block(&self, contact: usize) -> DMat3 {
         let contact = &self.problem.contacts[contact];
         let mut block = [[0.0; 3]; 3];
@@ -94,7 +95,7 @@ impl<'a> Operator<'a> {
     }
 }
 
-/// The inverse of an inertia, scaled to order 1 on the way, so that the determinant of a small one does not vanish.
+/// The inverse of an inertia. It is scaled to order 1 first, so that the determinant of a small one does not underflow.
 pub(super) fn inverse(inertia: DMat3) -> DMat3 {
     let scale = 3.0 / (inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z);
     (inertia * scale).inverse() * scale

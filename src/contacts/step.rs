@@ -1,4 +1,4 @@
-//! A contact problem from a step: what its first substep asks of the velocities, without springs and without memory.
+//! A contact problem from a step: the velocity conditions of its first substep, without springs and warm starting.
 
 use glam::{DMat3, DVec3};
 
@@ -7,10 +7,10 @@ use super::{ContactProblem, FreeBody, PointContact, Velocity};
 use crate::problem::{BodyRow, ContactRow, MassRow, StepProblem};
 
 impl ContactProblem {
-    /// The cold, hard problem of a substep: every contact is rigid and may close its gap in the substep, overlap is left
-    /// alone, and impulses begin at zero. `problem` has the velocities that the sweeps of the substep find, gravity
-    /// included. Bodies that nothing touches are left out; what moves on its own goes into the offsets. Joints have no place
-    /// here and are left out.
+    /// The hard problem of a substep, from zero impulses. Every contact is rigid and can close its gap within the
+    /// substep, overlap is not corrected, and impulses begin at zero. `problem` has the velocities at the start of the
+    /// sweeps of the substep, including gravity. Bodies without contacts are left out. The motion of kinematic bodies
+    /// is part of the offsets. Joints are left out.
     ///
     /// ```
     /// use drystone::{ContactProblem, Reference, Scene, Simulation, SolverConfig};
@@ -38,7 +38,7 @@ impl ContactProblem {
             let frame = frame(row);
             for point in &problem.points[row.first_point as usize..(row.first_point + row.point_count) as usize] {
                 let (r_a, r_b) = (wide(point.r_a), wide(point.r_b));
-                // How what no contact can push moves by itself at the point.
+                // The velocity at the point of a body that contacts cannot push.
                 let driven = |body: u32, own: Option<u32>, arm: DVec3| match own {
                     Some(_) => DVec3::ZERO,
                     None => {
@@ -74,7 +74,7 @@ fn velocity(body: &BodyRow) -> Velocity {
     Velocity { linear: wide(body.v), angular: wide(body.w) }
 }
 
-/// The frame of a manifold, orthonormal in all digits.
+/// The frame of a manifold, orthonormal to full precision.
 fn frame(row: &ContactRow) -> [DVec3; 3] {
     let normal = wide(row.normal).normalize();
     let tangent = wide(row.tangent).reject_from_normalized(normal).normalize();

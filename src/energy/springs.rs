@@ -1,4 +1,4 @@
-//! What the springs of joints and contacts hold, and the work of what the caller drives.
+//! The energy in the springs of joints and contacts, and the work of driven bodies and drives.
 
 use glam::{Quat, Vec3};
 
@@ -12,7 +12,7 @@ use crate::math::dot3;
 use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count};
 use crate::world::{Body, BodyKind, World};
 
-/// Adds what the springs that hold joints shut hold now, half of their force times their gap each; and notes the levers of joints.
+/// Adds the energy that the springs of joints hold now, half of force times gap each, and records the levers of joints.
 pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &World, substep: impl Fn(usize) -> f64) {
     for &row in problem.rows_of(&problem.joint_colors()) {
         let joint = &problem.joints[row as usize];
@@ -38,8 +38,9 @@ pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &
     }
 }
 
-/// Adds what the springs of joints of new bodies, and of new joints, held when the step began: m (w gap)²/2, m the mass that moves and w the
-/// frequency, and no more than `push_limit` lets their bodies part. `fresh` has the bodies, ascending.
+/// Adds the energy that the springs of joints of new bodies, and of new joints, held at the start of the step: m (w
+/// gap)²/2, where m is the moved mass and w the frequency, but at most the energy at the separation speed `push_limit`.
+/// `fresh` has the bodies in ascending order.
 pub(super) fn add_springs_at_start(
     entries: &mut [Entry],
     problem: &StepProblem,
@@ -69,8 +70,8 @@ pub(super) fn add_springs_at_start(
     }
 }
 
-/// Adds the work of kinematic bodies that move, and of the drives of joints. That of a motor is its impulse at the faster of the speeds that its
-/// axis had; a spring of the caller gives back the energy of its deflection.
+/// Adds the work of driven bodies and of the drives of joints. The work of a motor is its impulse times the faster of
+/// the two speeds of its axis. A spring of the caller gives back the energy of its deflection.
 pub(super) fn add_work_of_drives(
     entries: &mut [Entry],
     problem: &StepProblem,
@@ -102,7 +103,7 @@ pub(super) fn add_work_of_drives(
                 let pull = problem.joint_impulse(&problem.joint_totals, row as usize);
                 let twist = problem.axis_impulse(&problem.joint_totals, row as usize, false);
                 let velocity = driver.linear_velocity + driver.angular_velocity.cross(Vec3::from(arm));
-                // What the driver gives is what it does not take.
+                // The driver gives what the joint takes from it.
                 work -= sign * f64::from(velocity.dot(pull) + driver.angular_velocity.dot(twist));
             }
         }
@@ -115,7 +116,7 @@ pub(super) fn add_work_of_drives(
             if axis.impulse_scale > 0.0 {
                 let masses = motions.each_ref().map(|(pair, motion)| axis_inverse_mass(pair, motion).recip());
                 let (mass, h) = (0.5 * (masses[0] + masses[1]), substep(body as usize));
-                // Places at the times of the velocities.
+                // Positions at the times of the velocities.
                 let held =
                     |i: usize| held_by_drive(&axis, axis.gap + motions[i].1.moved - 0.5 * h * speeds[i], mass, h);
                 work += held(0) - held(1);
@@ -128,7 +129,7 @@ pub(super) fn add_work_of_drives(
     }
 }
 
-/// What a spring of the caller holds at a deflection where its axis moves a mass, up to its largest force (J).
+/// Energy of a spring of the caller at a deflection, if its axis moves this mass, with the limit on its force (J).
 fn held_by_drive(axis: &Axis<f64>, deflection: f64, mass: f64, substep: f64) -> f64 {
     let (stiffness, most) = (mass * axis.rate / substep, axis.max_impulse / substep);
     let reach = deflection.abs().min(most / stiffness);
@@ -150,7 +151,7 @@ fn pair_of(problem: &StepProblem, joint: &JointRow) -> Pair<f64> {
     Pair { a, b, mass_a, mass_b, ..Pair::default() }
 }
 
-/// The same when the step began.
+/// The bodies of a joint at the start of the step.
 fn pair_at_start(pair: &Pair<f64>, world: &World, joint: &JointRow) -> Pair<f64> {
     let body = |end: u32| {
         let mut row = BodyRow::AT_REST;
@@ -163,7 +164,7 @@ fn pair_at_start(pair: &Pair<f64>, world: &World, joint: &JointRow) -> Pair<f64>
     Pair { a, b, ..*pair }
 }
 
-/// The work of a body that moves through a contact, by the impulse of the whole step (J).
+/// The work of a driven body through a contact, from the impulse of the whole step (J).
 fn work_of_contact(driver: &Body, contact: &ContactRow, is_a: bool, problem: &StepProblem) -> f64 {
     let (t_1, t_2) = contact.tangents();
     let normal = Vec3::from(contact.normal);
@@ -176,7 +177,7 @@ fn work_of_contact(driver: &Body, contact: &ContactRow, is_a: bool, problem: &St
         let arm = Vec3::from(if is_a { point.r_a } else { point.r_b });
         let velocity = driver.linear_velocity + driver.angular_velocity.cross(arm);
         let slip = t_1 * total.tangent_1 + t_2 * total.tangent_2;
-        // The normal impulse of a patch is that of its twist.
+        // The normal impulse of a patch is the impulse of its twist.
         work += f64::from(match Some(k) == patch {
             true => velocity.dot(slip) + driver.angular_velocity.dot(normal) * total.normal,
             false => velocity.dot(normal * total.normal + slip),
@@ -185,7 +186,8 @@ fn work_of_contact(driver: &Body, contact: &ContactRow, is_a: bool, problem: &St
     work
 }
 
-/// What the springs of a contact held when the step began, and hold now (J): m (w s)²/2 at the overlap s, as far as `push_limit` lets them push.
+/// Energy that the springs of a contact held at the start of the step, and that they hold now (J): m (w s)²/2 at the
+/// overlap s, as far as `push_limit` lets them push.
 pub(super) fn held_by_contact(problem: &StepProblem, contact: &ContactRow, substep: &Substep) -> [f64; 2] {
     let both = can_move(problem, contact.body_a) && can_move(problem, contact.body_b);
     let softness = if both { substep.movable } else { substep.fixed };
@@ -194,7 +196,8 @@ pub(super) fn held_by_contact(problem: &StepProblem, contact: &ContactRow, subst
     let most = f64::from(softness.push_limit);
     let [a, b] = [contact.body_a, contact.body_b].map(|body| &problem.bodies[body as usize]);
     let normal = Vec3::from(contact.normal);
-    // An arm that turned moves along the normal by its part along the difference of the normal, turned back, from the normal.
+    // A rotated arm moves along the normal by its component along the difference between the back-rotated normal and
+    // the normal.
     let [back_a, back_b] = [a, b].map(|row| Quat::from_array(row.dq).inverse() * normal - normal);
     let shift = normal.dot(Vec3::from(b.dp) - Vec3::from(a.dp));
     let mut held = [0.0; 2];

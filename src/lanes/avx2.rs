@@ -1,5 +1,5 @@
-//! Sixteen numbers in two AVX2 registers. Only for use inside functions that enable `avx2`, which
-//! [`super::instructions`] enters after it has asked the processor.
+//! Sixteen numbers in two AVX2 registers. Use this type only inside functions that enable `avx2`;
+//! [`super::instructions`] enters them after it has checked the processor.
 
 use std::arch::x86_64::*;
 
@@ -48,7 +48,7 @@ fn inverse_power(x: __m256) -> __m256 {
     }
 }
 
-/// Where Newton's method begins.
+/// The starting value of Newton's method.
 #[inline(always)]
 fn guess(x: __m256) -> __m256 {
     unsafe {
@@ -126,7 +126,7 @@ fn floats_below(x: __m256, steps: i32) -> __m256 {
     unsafe { _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(x), _mm256_set1_epi32(steps))) }
 }
 
-/// Rows become columns.
+/// Transposes rows to columns.
 #[inline(always)]
 fn transposed(r: [__m256; 8]) -> [__m256; 8] {
     unsafe {

@@ -1,5 +1,5 @@
-//! Sixteen numbers in one AVX-512 register. Only for use inside functions that enable `avx512f`, which
-//! [`super::instructions`] enters after it has asked the processor.
+//! Sixteen numbers in one AVX-512 register. Use this type only inside functions that enable `avx512f`;
+//! [`super::instructions`] enters them after it has checked the processor.
 
 use std::arch::x86_64::*;
 
@@ -74,7 +74,7 @@ impl Lanes for Avx512 {
     }
     #[inline(always)]
     fn scattered(c: [Self; 8]) -> [Row8; WIDTH] {
-        // Quarter q of the i-th is the first half of row 4 q + i, or the second.
+        // Quarter q of register i is the first half of row 4 q + i, or the second.
         let first = transposed([c[0].0, c[1].0, c[2].0, c[3].0]);
         let second = transposed([c[4].0, c[5].0, c[6].0, c[7].0]);
         let mut rows = [Row8::default(); WIDTH];
@@ -104,7 +104,7 @@ impl Lanes for Avx512 {
     fn with_sign(self, sign: Self) -> Self {
         unsafe {
             let (magnitude, sign) = (_mm512_castps_si512(self.0), _mm512_castps_si512(sign.0));
-            // Of the bits of the first number those that the mask does not have, of the second those that it has.
+            // From the first number take the bits outside the mask, from the second the bits inside it.
             let both = _mm512_ternarylogic_epi32::<0xd8>(magnitude, sign, _mm512_set1_epi32(i32::MIN));
             Self(_mm512_castsi512_ps(both))
         }
@@ -133,7 +133,7 @@ fn upper(x: __m512) -> __m256 {
     unsafe { _mm256_castpd_ps(_mm512_extractf64x4_pd::<1>(_mm512_castps_pd(x))) }
 }
 
-/// Rows become columns, in each quarter of four registers.
+/// Transposes rows to columns in each quarter of four registers.
 #[inline(always)]
 fn transposed(r: [__m512; 4]) -> [__m512; 4] {
     unsafe {

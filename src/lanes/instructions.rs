@@ -1,27 +1,28 @@
-//! The instruction set is chosen at run time.
+//! Chooses the instruction set at run time.
 
 use std::ops::Range;
 
 use super::Lanes;
 
-/// What a processor can do.
+/// An instruction set of a processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
-    /// What every processor of its kind has.
+    /// The baseline of the target.
     Portable,
-    /// Eight numbers in one register of an x86-64 processor. Only [`InstructionSet::each`] makes it, after it has asked.
+    /// Eight numbers in one register of an x86-64 processor. Only [`InstructionSet::each`] creates it, after it has
+    /// checked the processor.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// Sixteen numbers in one register; the same holds.
+    /// Sixteen numbers in one register, likewise.
     #[cfg(target_arch = "x86_64")]
     Avx512,
-    /// Four numbers in one register of WebAssembly, in a program that is compiled for it.
+    /// Four numbers in one register of WebAssembly, in a program that was compiled for it.
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     Simd128,
 }
 
 impl InstructionSet {
-    /// Those that this processor has, the best last.
+    /// The instruction sets of this processor, the best last.
     pub fn each() -> impl DoubleEndedIterator<Item = Self> {
         let has = |set: &Self| match set {
             Self::Portable => true,
@@ -45,7 +46,7 @@ impl InstructionSet {
         known.into_iter().filter(has)
     }
 
-    /// Its name, for people.
+    /// Its name, for reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Portable => "portable",
@@ -60,20 +61,20 @@ impl InstructionSet {
 }
 
 impl Default for InstructionSet {
-    /// The best that this processor has.
+    /// The best instruction set of this processor.
     fn default() -> Self {
         Self::each().next_back().unwrap_or(Self::Portable)
     }
 }
 
-/// What is done to groups of sixteen, over whatever lanes.
+/// Work on groups of sixteen, for any lane type.
 pub trait Work: Sync {
-    /// Does some groups. To be inlined: what is not loses the instruction set.
+    /// Processes some groups. It has to be inlined: a separate function would lose the instruction set.
     fn over<L: Lanes>(&self, groups: Range<usize>);
 }
 
 impl InstructionSet {
-    /// Does some groups of a work; no other task has the same.
+    /// Processes some groups of the work. No other task has the same groups.
     pub fn run(self, work: &impl Work, groups: Range<usize>) {
         match self {
             #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
@@ -84,7 +85,8 @@ impl InstructionSet {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => unsafe { run_avx512(work, groups) },
-            // A module with these instructions leaves the portable lanes out: a page loads them for nothing, and the bits are the same.
+            // A module with these instructions leaves the portable lanes out: a page would load them for nothing, and
+            // the bits are the same.
             #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
             Self::Portable | Self::Simd128 => work.over::<super::simd128::Simd128>(groups),
         }

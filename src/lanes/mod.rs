@@ -1,8 +1,8 @@
-//! Sixteen numbers side by side, for every instruction set there is.
+//! Sixteen numbers side by side, for every instruction set.
 //!
-//! Sixteen fill one register of the widest instruction set, and two or four of the others. The dearest thing in a sweep is to bring
-//! bodies from where they stand in memory to the lanes and back ([`Lanes::columns`], [`Lanes::scattered`]): with lanes of eight it
-//! took 41 % of all instructions.
+//! Sixteen numbers fill one register of the widest instruction set, and two or four of the others. The most expensive
+//! part of a sweep is to move bodies from memory to the lanes and back ([`Lanes::columns`], [`Lanes::scattered`]): with
+//! lanes of eight it took 41 % of all instructions.
 
 #![allow(unsafe_code)]
 
@@ -24,7 +24,7 @@ pub use shared::Shared;
 
 use crate::math::Lane;
 
-/// How many contacts are worked on side by side.
+/// Number of contacts that are processed side by side.
 pub const WIDTH: usize = 16;
 
 /// One number of each of sixteen contacts.
@@ -39,11 +39,12 @@ pub struct Row8(pub [f32; 8]);
 
 /// A lane of sixteen numbers.
 pub trait Lanes: Lane {
-    /// From memory.
+    /// Loads from memory.
     fn load(from: &Wide) -> Self;
-    /// To memory.
+    /// Stores to memory.
     fn store(self) -> Wide;
-    /// From rows of sixteen bodies, number by number. Where each row is, in units of 8 bytes from `rows`, say `places`.
+    /// Loads rows of sixteen bodies, number by number. `places` has the offset of each row from `rows`, in units of 8
+    /// bytes.
     ///
     /// # Safety
     /// A row is at each of the places, and no thread writes it meanwhile.
@@ -52,37 +53,38 @@ pub trait Lanes: Lane {
         // SAFETY: the caller's promise.
         unsafe { Self::columns(&lanes!(lane => row_at(rows, places[lane]).cast())) }
     }
-    /// From sixteen rows of eight numbers, number by number.
+    /// Loads sixteen rows of eight numbers, number by number.
     ///
     /// # Safety
     /// Eight numbers are at each of the addresses, and no thread writes them meanwhile.
     unsafe fn columns(rows: &[*const f32; WIDTH]) -> [Self; 8];
-    /// To sixteen rows.
+    /// Converts to sixteen rows.
     fn scattered(columns: [Self; 8]) -> [Row8; WIDTH];
-    /// The square root, rounded as IEEE 754 asks. No kernel may use it.
+    /// The square root, rounded as IEEE 754 requires. No kernel may use it.
     fn sqrt(self) -> Self;
-    /// The quotient, rounded as IEEE 754 asks. No kernel may use it.
+    /// The quotient, rounded as IEEE 754 requires. No kernel may use it.
     fn divided_by(self, divisor: Self) -> Self;
     /// The magnitude of `self` with the sign bit of `sign`.
     fn with_sign(self, sign: Self) -> Self;
-    /// The number whose bits are fewer by `steps`: for positive normal numbers the one that lies so many floats below.
+    /// The number with bits that are smaller by `steps`: for positive normal numbers, the float that is `steps` floats
+    /// below.
     fn floats_below(self, steps: i32) -> Self;
 }
 
 /// The row at a place.
 ///
 /// # Safety
-/// `place` is where a row of the allocation of `rows` begins.
+/// `place` is the offset of a row in the allocation of `rows`.
 #[inline(always)]
 pub unsafe fn row_at(rows: *const Row8, place: u32) -> *const Row8 {
     // SAFETY: the caller's promise. Indices of the processor count in eights.
     unsafe { rows.cast::<u64>().add(place as usize).cast() }
 }
 
-/// The row number `row` of each of sixteen of `all`, number by number.
+/// The row number `row` of each of sixteen elements of `all`, number by number.
 ///
 /// # Panics
-/// If one of `which` is not in `all`.
+/// An index in `which` is out of range.
 #[inline(always)]
 pub fn columns<L: Lanes, T: bytemuck::Pod>(all: &[T], row: usize, which: &[u32; WIDTH]) -> [L; 8] {
     const { assert!(align_of::<T>() >= align_of::<Row8>()) };
@@ -97,7 +99,7 @@ pub fn columns<L: Lanes, T: bytemuck::Pod>(all: &[T], row: usize, which: &[u32; 
     unsafe { L::gathered(all.as_ptr().cast::<Row8>().add(row), &places) }
 }
 
-/// An array of what an expression is for each lane, without a closure: a closure would be compiled for the plain
+/// An array with the value of an expression for each lane, without a closure: a closure would be compiled for the plain
 /// instruction set.
 macro_rules! lanes {
     ($lane:ident => $value:expr) => {
@@ -112,7 +114,8 @@ macro_rules! lanes {
 }
 pub(crate) use lanes;
 
-/// Arithmetic of a type of lanes: what each function does to the registers `a` and `b` of its arguments, and for a mask `m`.
+/// Arithmetic of a lane type: the operation of each function on the registers `a` and `b` of its arguments, and on a
+/// mask `m`.
 macro_rules! lane {
     (
         $Type:ident, $Mask:ty, |$a:ident, $b:ident, $m:ident|

@@ -1,4 +1,4 @@
-//! Sixteen numbers in plain Rust: right on every target.
+//! Sixteen numbers in plain Rust, for every target.
 
 use super::{Lanes, Row8, WIDTH, Wide, lane, lanes};
 use crate::math::{INVERSE_SQRT_GUESS, Lane};

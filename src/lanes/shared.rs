@@ -1,14 +1,14 @@
-//! One slice that several threads write to, each its own elements.
+//! A slice that several threads write, each its own elements.
 
 #![allow(unsafe_code)]
 
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// A slice whose elements are handed out for writing through a shared reference.
+/// A slice with elements that several threads can write through a shared reference.
 ///
-/// Safe Rust has no cheaper way to let the threads of one color write their bodies: locks or atomics an element cost as much
-/// as the sweep itself. Colors promise that no element is written twice.
+/// Safe Rust has no cheaper way for the threads of one color to write their bodies: locks or atomics for each element
+/// cost as much as the sweep itself. Colors guarantee that no element is written twice.
 #[derive(Clone, Copy)]
 pub struct Shared<'a, T> {
     start: *mut T,
@@ -27,7 +27,7 @@ impl<'a, T: Copy> Shared<'a, T> {
         Self { start: slice.as_mut_ptr(), len: slice.len(), borrowed: PhantomData }
     }
 
-    /// Where the first element is. Reading and writing through it asks the same as the functions below.
+    /// The address of the first element. Access through it has the same safety requirements as the functions below.
     #[inline(always)]
     pub fn as_ptr(&self) -> *mut T {
         self.start
@@ -39,7 +39,7 @@ impl<'a, T: Copy> Shared<'a, T> {
         self.len == 0
     }
 
-    /// Some elements, to write in place.
+    /// Some elements, mutable in place.
     ///
     /// # Safety
     /// No other thread reads or writes them meanwhile.

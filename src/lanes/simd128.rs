@@ -1,5 +1,5 @@
-//! Sixteen numbers in four registers of WebAssembly. The engine takes a module with these instructions or refuses it whole, so that they are
-//! chosen when the program is compiled (`-C target-feature=+simd128`).
+//! Sixteen numbers in four registers of WebAssembly. The engine accepts or refuses a module with these instructions as
+//! a whole, so they are chosen at compile time (`-C target-feature=+simd128`).
 
 use std::arch::wasm32::*;
 
@@ -17,7 +17,7 @@ macro_rules! each {
     };
 }
 
-// `f32x4_pmax(b, a)` is a where a > b, else b, and `f32x4_pmin(b, a)` is a where a < b, else b, as the other lanes have it.
+// `f32x4_pmax(b, a)` is a if a > b, else b, and `f32x4_pmin(b, a)` is a if a < b, else b, like the other lane types.
 lane! {
     Simd128, [v128; 4], |a, b, m|
     neg = each!(f32x4_neg; a);
@@ -42,7 +42,7 @@ fn inverse_power(x: v128) -> v128 {
     i32x4_sub(i32x4_splat(OPPOSITE_EXPONENT as i32), v128_and(x, i32x4_splat(EXPONENT as i32)))
 }
 
-/// Where Newton's method begins.
+/// The starting value of Newton's method.
 #[inline(always)]
 fn guess(x: v128) -> v128 {
     i32x4_sub(i32x4_splat(INVERSE_SQRT_GUESS as i32), u32x4_shr(x, 1))
@@ -114,7 +114,7 @@ impl Lanes for Simd128 {
     }
 }
 
-/// Four rows become four columns.
+/// Transposes four rows to four columns.
 #[inline(always)]
 fn transposed([a, b, c, d]: [v128; 4]) -> [v128; 4] {
     let (ab_low, ab_high) = (i32x4_shuffle::<0, 4, 1, 5>(a, b), i32x4_shuffle::<2, 6, 3, 7>(a, b));

@@ -1,13 +1,15 @@
-//! Products, lengths and angles of rotations in a written order, and sines of angles that are the same everywhere.
+//! Products, lengths and angles of rotations in a fixed order, and sines of angles with the same bits on every
+//! platform.
 //!
-//! glam multiplies and normalizes quaternions in another order on each instruction set (SSE2, NEON, simd128, none), and asks the platform
-//! for sines. A step, and all that a step begins from, takes these functions instead. glam's product of a rotation with a vector has one order.
+//! glam multiplies and normalizes quaternions in a different order on each instruction set (SSE2, NEON, simd128, none),
+//! and uses the platform's sine. A step and all its inputs use these functions instead. glam's product of a rotation
+//! and a vector has only one order.
 
 use glam::{Quat, Vec3};
 
 use super::{Lane, Quat as Rotation, vec3};
 
-/// First b, then a: the sum of two pairs of terms. The order is that of glam with SSE2.
+/// b first, then a: the sum of two pairs of terms. The order is that of glam with SSE2.
 #[inline(always)]
 pub fn paired_product<L: Lane>(a: Rotation<L>, b: Rotation<L>) -> Rotation<L> {
     let (p, q) = (a.axis, b.axis);
@@ -21,27 +23,27 @@ pub fn paired_product<L: Lane>(a: Rotation<L>, b: Rotation<L>) -> Rotation<L> {
     }
 }
 
-/// First `second`, then `first`, as `first * second`.
+/// `second` first, then `first`, like `first * second`.
 #[inline]
 pub fn product(first: Quat, second: Quat) -> Quat {
     let [a, b] = [first, second].map(|q| Rotation::<f32>::load(q.to_array()));
     Quat::from_array(paired_product(a, b).store())
 }
 
-/// The square of the length of a quaternion.
+/// The squared length of a quaternion.
 #[inline]
 pub fn squared_length(q: Quat) -> f32 {
     (q.x * q.x + q.z * q.z) + (q.y * q.y + q.w * q.w)
 }
 
-/// The quaternion at unit length; not a number for zero.
+/// The quaternion at unit length; NaN for a zero quaternion.
 #[inline]
 pub fn unit(q: Quat) -> Quat {
     let length = squared_length(q).sqrt();
     Quat::from_array(q.to_array().map(|x| x / length))
 }
 
-/// The rotation from one unit vector to another by the shortest way.
+/// The shortest rotation from one unit vector to another.
 pub fn arc(from: Vec3, to: Vec3) -> Quat {
     const NEARLY: f32 = 1.0 - 2.0 * f32::EPSILON;
     let cosine = from.dot(to);
@@ -55,7 +57,7 @@ pub fn arc(from: Vec3, to: Vec3) -> Quat {
     unit(Quat::from_xyzw(axis.x, axis.y, axis.z, 1.0 + cosine))
 }
 
-/// The vector of a rotation: its axis times its angle (rad).
+/// The rotation vector: axis times angle (rad).
 pub fn vector_of(q: Quat) -> Vec3 {
     let axis = q.xyz();
     let length = axis.length();
@@ -108,7 +110,7 @@ mod tests {
         assert!((arc(Vec3::X, Vec3::NEG_X) * Vec3::X + Vec3::X).length() < 1e-6);
     }
 
-    /// Steps of this program had these orders before they were written down: bits that are older stay.
+    /// Steps of earlier versions had these orders; their bits stay the same.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     #[test]
     fn the_order_is_that_of_glam_with_sse2() {

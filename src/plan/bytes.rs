@@ -1,4 +1,4 @@
-//! How many bytes a plan moves.
+//! The number of bytes that a plan moves.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::problem::{
 };
 
 impl StepPlan {
-    /// Bytes that the kernels read and write when every row that a thread names is moved once.
+    /// Bytes that the kernels read and write, if every row of a thread is moved once.
     pub fn bytes_moved(&self, problem: &StepProblem, contacts: &ContactSummary) -> u64 {
         self.passes.iter().map(|pass| pass.bytes_moved(problem, contacts)).sum()
     }
@@ -59,7 +59,7 @@ impl Pass {
             Kernel::IntegrateGyroscopic { .. } => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
             Kernel::TurnInertias => rows.len() * (size_of::<TurningRow>() + BODY / 2 + MASS),
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
-            // Reads and writes what was before, and writes where the sweep begins.
+            // Reads and writes the previous values, and writes the start of the sweep.
             Kernel::Extrapolate { .. } => 4 * VELOCITIES * problem.bodies.len() + 5 * IMPULSE * problem.impulse_count(),
             Kernel::MeasureStep => 3 * IMPULSE * problem.impulse_count(),
             Kernel::UpdateMomentum => {
@@ -82,7 +82,7 @@ impl Pass {
                 let patches = if rules.patch { contacts } else { 0 };
                 let writes = !matches!(self.kernel, Kernel::WarmStart(_));
                 let once = size_of::<PointRow>() + IMPULSE * if writes { 2 } else { 1 };
-                // Friction at points goes over them a second time; per manifold it adds one row.
+                // Friction at points reads them a second time; friction per manifold adds one row.
                 let again = if writes && rules.friction != FrictionRule::None && !rules.patch { points } else { 0 };
                 contacts * (size_of::<ContactRow>() + pair) + (points + again + patches) * once
             }
@@ -90,7 +90,8 @@ impl Pass {
         bytes as u64
     }
 
-    /// Bytes of a kernel over systems of joints: bodies and joints, blocks of the factors, and the products that they are made of.
+    /// Bytes of a kernel over joint systems: bodies and joints, blocks of the factors, and the products that form the
+    /// blocks.
     fn bytes_of_systems(&self, problem: &StepProblem) -> usize {
         const PAIR: usize = 2 * (size_of::<BodyRow>() + size_of::<MassRow>());
         const BLOCK: usize = 48;

@@ -11,87 +11,88 @@ use crate::kernels::Rules;
 pub enum Kernel {
     /// Gravity and forces; over bodies.
     IntegrateVelocities {
-        /// Whether the impulses that the last substep ended with are applied as well, as velocities.
+        /// Whether the kernel also applies the final impulses of the last substep, as velocities.
         warm_start: bool,
-        /// Whether velocities are changes since the step began, here and below.
+        /// Whether velocities are changes since the start of the step, here and below.
         from_start: bool,
     },
-    /// Velocities become changes since the step began; over bodies.
+    /// Turns velocities into changes since the start of the step; over bodies.
     BeginChanges,
-    /// Changes become velocities; over bodies.
+    /// Turns changes back into velocities; over bodies.
     EndChanges,
     /// Torques; over bodies.
     IntegrateTorques {
-        /// As of `IntegrateVelocities`.
+        /// Like in `IntegrateVelocities`.
         from_start: bool,
     },
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic {
-        /// As of `IntegrateVelocities`.
+        /// Like in `IntegrateVelocities`.
         from_start: bool,
     },
-    /// Forgets impulses; over contact colors, all at once.
+    /// Clears impulses; over contact colors, all at once.
     ClearImpulses,
-    /// Adds the impulses of a substep to those of the substeps before; over contact colors, all at once.
+    /// Adds the impulses of a substep to the sums of earlier substeps; over contact colors, all at once.
     SumImpulses {
-        /// Whether no substep came before.
+        /// Whether this is the first substep.
         first: bool,
     },
     /// The same; over joint colors, all at once.
     SumJointImpulses {
-        /// As of `SumImpulses`.
+        /// Like in `SumImpulses`.
         first: bool,
     },
-    /// Inertia of bodies that turned; over `turning`.
+    /// Rotates the inertia of bodies; over `turning`.
     TurnInertias,
-    /// Joints that are solved at once begin where their bodies are; over systems.
+    /// Sets up joint systems at the present poses of their bodies; over systems.
     BeginSystems,
-    /// Impulses that the joints carry; over joint colors.
+    /// Applies carried impulses of joints; over joint colors.
     WarmStartJoints {
         /// Whether joints have axes.
         axes: bool,
     },
-    /// Impulses that the manifolds carry; over contact colors.
+    /// Applies carried impulses of manifolds; over contact colors.
     WarmStart(Rules),
-    /// Counts a sweep, and decides whether it is still needed; `first` of its kind in a substep always is.
+    /// Counts a sweep, and decides whether it is still needed. The `first` sweep of its kind in a substep always is.
     BeginSweep {
         /// Whether it is the first.
         first: bool,
     },
-    /// Goes on in the direction of the last sweeps, or, `first`, only remembers where they begin; over bodies, points and joints.
+    /// Continues in the direction of the last sweeps; with `first` it only stores their start. Over bodies, points and
+    /// joints.
     Extrapolate {
         /// Whether no sweep came before.
         first: bool,
-        /// Whether it is left out where sweeps are no longer needed.
+        /// Whether the kernel is skipped when sweeps are no longer needed.
         measured: bool,
     },
-    /// How far the last sweep moved the impulses; over points and joints.
+    /// Measures the change of impulses in the last sweep; over points and joints.
     MeasureStep,
-    /// How far the next extrapolation goes.
+    /// Computes the length of the next extrapolation.
     UpdateMomentum,
     /// One sweep of the joints; over joint colors.
     SolveJoints(Rules),
-    /// One sweep of the limits and drives of joints that are solved at once; over their colors.
+    /// One sweep of the limits and drives of joints in systems; over their colors.
     SolveAxes(Rules),
-    /// The velocities that joints lack which are solved at once; over their colors, in any order.
+    /// Measures the velocity errors of joints in systems; over their colors, in any order.
     MeasureJoints(Rules),
-    /// Solves joints at once; over systems.
+    /// Solves joint systems; over systems.
     SolveJointSystems(Rules),
-    /// Corrections of joints that are solved at once; over their colors.
+    /// Applies the corrections of joints in systems; over their colors.
     ApplyJointChanges(Rules),
     /// One sweep of the contacts; over contact colors.
     SolveContacts(Rules),
-    /// Poses; over bodies.
+    /// Integrates poses; over bodies.
     IntegratePositions {
-        /// As of `IntegrateVelocities`.
+        /// Like in `IntegrateVelocities`.
         from_start: bool,
     },
-    /// Bounces; over contact colors.
+    /// Applies restitution; over contact colors.
     ApplyRestitution(Rules),
 }
 
 impl Kernel {
-    /// Name of the shader file and of its entry point.
+    /// Name of the shader file.
     pub fn name(self) -> &'static str {
         match self {
             Self::IntegrateVelocities { .. } => "integrate_velocities",
@@ -121,7 +122,7 @@ impl Kernel {
         }
     }
 
-    /// Whether it goes over the one color that a block has of bodies, of rows of inertia, or of systems of joints.
+    /// Whether it processes the only color that a block has of bodies, of inertia rows, or of joint systems.
     pub fn has_one_color(self) -> bool {
         matches!(
             self,
@@ -137,7 +138,7 @@ impl Kernel {
         )
     }
 
-    /// Rules of a kernel that sweeps constraints, or none.
+    /// Rules of a kernel that sweeps constraints, or `None`.
     pub fn rules(self) -> Option<Rules> {
         match self {
             Self::WarmStart(rules)
@@ -152,12 +153,12 @@ impl Kernel {
         }
     }
 
-    /// Whether it presses the points of a manifold as one.
+    /// Whether it treats the points of a manifold as one.
     pub fn presses_as_one(self) -> bool {
         matches!(self, Self::SolveContacts(Rules { as_one: true, .. }) | Self::ApplyRestitution(_))
     }
 
-    /// Whether the kernel works with velocities that are changes since the step began.
+    /// Whether the kernel works with velocities that are changes since the start of the step.
     pub fn is_from_start(self) -> bool {
         match self {
             Self::IntegrateVelocities { from_start, .. }
@@ -168,7 +169,7 @@ impl Kernel {
         }
     }
 
-    /// Whether the kernel reads the velocities that the step began with, of pairs of bodies.
+    /// Whether the kernel reads the velocities of body pairs at the start of the step.
     pub fn reads_start(self) -> bool {
         let measures = matches!(
             self,
@@ -189,7 +190,7 @@ impl Kernel {
         }
     }
 
-    /// Whether the kernel reads the velocities of approach or the slips of points.
+    /// Whether the kernel reads the approach velocities or the slips of points.
     pub fn reads_approach_or_slip(self) -> bool {
         match self {
             Self::SolveContacts(rules) => rules.patch || rules.driven || rules.friction == FrictionRule::Slip,
@@ -197,7 +198,7 @@ impl Kernel {
         }
     }
 
-    /// Whether the kernel is left out where sweeps are no longer needed.
+    /// Whether the kernel is skipped when sweeps are no longer needed.
     pub fn is_measured(self) -> bool {
         match self {
             Self::Extrapolate { measured, .. } => measured,

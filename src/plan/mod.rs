@@ -1,8 +1,8 @@
-//! The order of work as data: which kernel goes over what, in which order.
+//! The order of work as data: the sequence of kernels and their ranges.
 //!
-//! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm stands here
-//! and nowhere else. A plan has no pass for a feature that its scene lacks: without friction no kernel has friction, and without
-//! restitution, torques, unequal moments of inertia or joints there are no passes for these.
+//! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm is here
+//! and nowhere else. A plan has no pass for a feature that its scene lacks. Without friction no kernel has friction,
+//! and without restitution, torques, unequal moments of inertia or joints there are no passes for them.
 
 mod bytes;
 mod kernel;
@@ -16,39 +16,41 @@ use crate::config::{Clamping, FUSE_BELOW, FrictionOrder, FrictionRule, FrictionS
 use crate::kernels::Rules;
 use crate::problem::{Block, ContactSummary, StepProblem};
 
-/// One dispatch: a kernel over some colors of a block, one after another.
+/// One dispatch: a kernel over some colors of a block, in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pass {
     /// The kernel.
     pub kernel: Kernel,
-    /// Which block of the problem.
+    /// The block of the problem.
     pub block: u32,
-    /// The colors that the kernel goes over; empty for a kernel that goes over everything. More than one are swept by one workgroup.
+    /// The colors of the kernel; empty for a kernel that processes everything. One workgroup sweeps them if there are
+    /// several.
     pub colors: Range<u32>,
 }
 
-/// Some sweeps: which, how, and over which groups of colors.
+/// Some sweeps: their kind, and their groups of colors.
 struct Sweeps<'a> {
     method: Method,
     range: Range<u32>,
-    /// Whether others may follow the last.
+    /// Whether other sweeps can follow the last one.
     go_on: bool,
     block: u32,
     joints: &'a [Range<u32>],
-    /// Joints that are solved at once: the color of their systems, and the groups of their colors.
+    /// Joints in systems: the color of their systems, and the groups of their colors.
     systems: &'a [Range<u32>],
     direct: &'a [Range<u32>],
-    /// Those groups, if any joint has a limit or a drive.
+    /// The groups of their colors if any joint has a limit or a drive.
     swept_axes: &'a [Range<u32>],
     contacts: &'a [Range<u32>],
-    /// Contacts whose points are struck together.
+    /// Contacts whose points are solved together.
     struck: &'a [Range<u32>],
-    /// Contacts whose friction jams.
+    /// Contacts with jamming friction.
     jamming: &'a [Range<u32>],
 }
 
-/// Sweeps over a contact that jams before the next contact. A rod whose tip is pushed into a floor (`drystone hard --case painleve`) gains
-/// up to 2.8e-2 of its energy in a step with 1 sweep, 7.7e-3 with 2, 5.4e-4 with 4 and 1e-5 with 8, at 4 to 128 substeps.
+/// Number of sweeps over a jamming contact before the next contact. A rod whose tip is pushed into a floor (`drystone
+/// hard --case painleve`) gains up to 2.8e-2 of its energy in a step with 1 sweep, 7.7e-3 with 2, 5.4e-4 with 4 and
+/// 1e-5 with 8, at 4 to 128 substeps.
 const JAMMED_PASSES: u8 = 8;
 
 /// The passes of one step.
@@ -65,25 +67,26 @@ const JAMMED_PASSES: u8 = 8;
 /// ```
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct StepPlan {
-    /// In order.
+    /// The passes, in order.
     pub passes: Vec<Pass>,
 }
 
 crate::saved::cloned!(StepPlan { passes });
 
-/// The properties of a problem that its plan depends on, besides the settings and the rows of contacts.
+/// The properties of a problem that its plan depends on, apart from the settings and the rows of contacts.
 #[derive(Debug)]
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     blocks: Vec<Block>,
     /// Whether impulses are summed over the substeps.
     totals: bool,
-    /// Whether those of joints are.
+    /// Whether impulses of joints are summed.
     joint_totals: bool,
-    /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
+    /// Whether the bodies of each block have equal moments of inertia. This can change, because joints lend some
+    /// inertia in each step.
     isotropic: Vec<bool>,
     has_torques: bool,
-    /// Whether joints have axes, and whether any is a limit or a drive.
+    /// Whether joints have axes, and whether any axis is a limit or a drive.
     axes: bool,
     swept_axes: bool,
 }
@@ -91,7 +94,7 @@ pub(crate) struct PlanKey {
 crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes, swept_axes });
 
 impl PlanKey {
-    /// Whether it is that of the plan of a problem.
+    /// Whether this is the key of the plan of a problem.
     pub fn is_of(&self, problem: &StepProblem) -> bool {
         self.blocks == problem.blocks
             && self.colors == problem.colors
@@ -103,7 +106,7 @@ impl PlanKey {
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
-    /// That of the plan of a problem.
+    /// The key of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
         let isotropic = isotropic(problem).collect();
         Self {
@@ -124,18 +127,18 @@ fn isotropic(problem: &StepProblem) -> impl Iterator<Item = bool> {
     problem.blocks.iter().map(|block| problem.is_isotropic(problem.rows_of(&(block.bodies..block.bodies + 1))))
 }
 
-/// Substeps shorter than this (s) find changes of velocities since the step began. Sums of velocities have a squared error of 3e-6 m²/s² in
-/// the scene `rolling` at 1/8000 s and 3e-4 at 1/32,000 s, and they change the energy of a free rotation by 8e-6 in 20 s at 1/480 s and by 3e-5
-/// at 1/1920 s.
+/// In shorter substeps than this (s), velocities are changes since the start of the step. Sums of velocities have a
+/// squared error of 3e-6 m²/s² in the scene `rolling` at 1/8000 s and 3e-4 at 1/32,000 s. They change the energy of a
+/// free rotation in 20 s by 8e-6 at 1/480 s and by 3e-5 at 1/1920 s.
 const LONGEST_FROM_START: f32 = 1.0 / 1000.0;
 
 impl StepPlan {
-    /// The plan of `problem` under `config`: one block after another.
+    /// The plan of `problem` with `config`: one block after another.
     pub fn new(config: &SolverConfig, problem: &StepProblem) -> Self {
         Self::with_summary(config, problem, &ContactSummary::of(problem))
     }
 
-    /// The same, where the summary of the contacts is known.
+    /// The same with a known summary of the contacts.
     pub fn with_summary(config: &SolverConfig, problem: &StepProblem, contacts: &ContactSummary) -> Self {
         let friction = if contacts.friction { config.friction_rule() } else { FrictionRule::None };
         let rules = Rules {
@@ -177,8 +180,8 @@ impl StepPlan {
         plan
     }
 
-    /// The substeps of a block: in each velocities, warm start, biased sweeps, positions, relax sweeps, sums of impulses. Those of the last
-    /// substep wait for the bounces.
+    /// The substeps of a block. Each has velocities, warm start, biased sweeps, positions, relax sweeps, and sums of
+    /// impulses. In the last substep, the sums come after restitution.
     fn substeps(&mut self, config: &SolverConfig, problem: &StepProblem, block: u32, shared: Rules) {
         let own = &problem.blocks[block as usize];
         let (substeps, from_start) = (own.substeps, shared.from_start);
@@ -208,12 +211,12 @@ impl StepPlan {
             struck: &struck,
             jamming: &jamming,
         };
-        // Friction needs some sweep to happen in.
+        // Friction needs at least one sweep.
         let relax_only = config.friction_sweeps == FrictionSweeps::Relax && config.relax > 0;
         let biased_friction = if relax_only { FrictionRule::None } else { shared.friction };
         let biased = Rules { biased: true, friction: biased_friction, ..shared };
-        // Neither arms nor masses of contacts change within a step, so that their impulses can be carried over as the
-        // velocities that they gave. The arms of joints turn.
+        // Arms and masses of contacts do not change within a step, so their impulses can be carried over as the
+        // velocities that they caused. The arms of joints rotate.
         let carried = shared.accumulated && joint_colors.is_empty() && !from_start;
         self.over_colors(Kernel::BeginSystems, block, systems);
         for substep in 0..substeps {
@@ -243,7 +246,7 @@ impl StepPlan {
         }
     }
 
-    /// Adds the impulses of a substep to those of the substeps before, where the problem has room for the sums.
+    /// Adds the impulses of a substep to the sums of earlier substeps, if the problem has room for the sums.
     fn sum_impulses(&mut self, problem: &StepProblem, block: u32, substep: u32) {
         let (first, [contacts, joints, ..]) = (substep == 0, problem.blocks[block as usize].colors());
         if !problem.totals.is_empty() && !contacts.is_empty() {
@@ -254,8 +257,9 @@ impl StepPlan {
         }
     }
 
-    /// Sweeps over a problem without time: what is wanted of the velocities stands in its rows, no body moves, and every
-    /// contact is hard. Every manifold is swept `passes` times before the next. `range` begins at 0, or where the sweeps of the run before ended.
+    /// Sweeps over a problem without duration: its rows have the target velocities, no body moves, and every contact is
+    /// hard. Every manifold is swept `passes` times before the next. `range` begins at 0, or at the end of the previous
+    /// run's sweeps.
     pub fn of_sweeps(problem: &StepProblem, method: Method, passes: u8, range: Range<u32>) -> Self {
         let friction = ContactSummary::of(problem).friction;
         let driven = problem.points.iter().any(|p| p.slip_1 != 0.0 || p.slip_2 != 0.0);
@@ -289,13 +293,13 @@ impl StepPlan {
 
     /// Sweeps in the order of the course sheet: joints, then contacts.
     ///
-    /// Joints have colors of their own. Colored together with the contacts they need as many (bridge: 6 + 2 apart, 8
-    /// together; chain 3 + 0 and 3), and one kernel would have to hold both.
+    /// Joints have separate colors. Colored together with the contacts they need as many (bridge: 6 + 2 separately, 8
+    /// together; chain 3 + 0 and 3), and one kernel would have to process both.
     ///
-    /// With a tolerance every sweep is preceded by `begin_sweep`, and a sweep that is no longer needed is skipped on the flag
-    /// that it leaves in a buffer: nothing is read back. A pile of 500 with up to 16 sweeps a substep and 1e-2 m/s took 0.66
-    /// of the time of all 16 on a software adapter and 0.23 on the reference. Indirect dispatch was not taken: each such call
-    /// adds a validating dispatch of its own, about the price of the empty one that it saves.
+    /// With a tolerance, `begin_sweep` runs before every sweep. It leaves a flag in a buffer, and a sweep that is no
+    /// longer needed is skipped: nothing is read back. A pile of 500 with up to 16 sweeps a substep and 1e-2 m/s took
+    /// 0.66 of the time of all 16 on a software adapter and 0.23 on the reference. Indirect dispatch is not used: each
+    /// such call adds a validating dispatch of its own, which costs about as much as the empty one that it saves.
     fn sweeps(&mut self, sweeps: Sweeps, rules: Rules) {
         let (measured, block) = (rules.measured, sweeps.block);
         for sweep in sweeps.range.clone() {
@@ -338,7 +342,8 @@ impl StepPlan {
     }
 }
 
-/// Colors of at least `fuse_below` rows stand alone; neighboring smaller ones go together.
+/// Splits colors into groups. A color with at least `fuse_below` rows is a group of its own; neighboring smaller colors
+/// form one group.
 fn color_groups(offsets: &[u32], colors: Range<u32>, fuse_below: u32) -> Vec<Range<u32>> {
     let mut groups: Vec<Range<u32>> = Vec::new();
     let mut last_is_small = false;
@@ -353,7 +358,7 @@ fn color_groups(offsets: &[u32], colors: Range<u32>, fuse_below: u32) -> Vec<Ran
     groups
 }
 
-/// One line a run of equal kernels: `3 x solve_contacts(friction) over colors 0, 1, 2..9`.
+/// One line for each run of equal kernels: `3 x solve_contacts(friction) over colors 0, 1, 2..9`.
 impl fmt::Display for StepPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for run in self.passes.chunk_by(|p, q| p.kernel == q.kernel && p.block == q.block) {

@@ -1,11 +1,11 @@
-//! Which bodies a query looks at.
+//! Filters: which bodies a query considers.
 
 use crate::world::{Body, BodyHandle, Groups};
 
-/// Whether a query looks at a body.
+/// Decides whether a query considers a body.
 pub type Predicate<'a> = &'a dyn Fn(BodyHandle, &Body) -> bool;
 
-/// Which bodies a query looks at: all of the first world, unless told otherwise.
+/// Selects the bodies that a query considers. The default is every body of the first world.
 ///
 /// ```
 /// use drystone::queries::{Filter, Queries};
@@ -36,45 +36,45 @@ pub type Predicate<'a> = &'a dyn Fn(BodyHandle, &Body) -> bool;
 /// ```
 #[derive(Clone, Copy, Default)]
 pub struct Filter<'a> {
-    /// The groups of what asks: bodies that it would not meet are left out.
+    /// The groups of the query. It ignores bodies that do not collide with these groups.
     pub groups: Groups,
-    /// The number of the world, of several [beside](crate::World::beside) each other.
+    /// The number of the world, if several stand [beside](crate::World::beside) each other.
     pub world: usize,
-    /// A body to leave out.
+    /// A body to ignore.
     pub except: Option<BodyHandle>,
-    /// Leaves out the bodies for which it is false.
+    /// Ignores the bodies for which this function returns false.
     pub only: Option<Predicate<'a>>,
-    /// Whether the query looks at sensors too; not unless told.
+    /// Whether the query considers sensors; false by default.
     pub sensors: bool,
 }
 
 impl<'a> Filter<'a> {
-    /// Asks as a member of groups.
+    /// Queries with these groups.
     pub fn groups(self, groups: Groups) -> Self {
         Self { groups, ..self }
     }
 
-    /// Asks about one of several worlds [beside](crate::World::beside) each other.
+    /// Queries one of several worlds that stand [beside](crate::World::beside) each other.
     pub fn world(self, world: usize) -> Self {
         Self { world, ..self }
     }
 
-    /// Leaves out a body, for instance the one that asks. A body that is gone or of another world leaves out none.
+    /// Ignores a body, for example the one that casts the ray. A handle that names no body of this world has no effect.
     pub fn except(self, body: BodyHandle) -> Self {
         Self { except: Some(body), ..self }
     }
 
-    /// Looks at sensors too.
+    /// Considers sensors too.
     pub fn with_sensors(self) -> Self {
         Self { sensors: true, ..self }
     }
 
-    /// Leaves out the bodies for which `only` is false.
+    /// Considers only the bodies for which `only` returns true.
     pub fn only(self, only: Predicate<'a>) -> Self {
         Self { only: Some(only), ..self }
     }
 
-    /// Whether the query looks at a body of its world.
+    /// Whether the query considers a body of its world.
     pub(super) fn accepts(&self, handle: BodyHandle, body: &Body) -> bool {
         !self.except.is_some_and(|except| except.is(handle))
             && self.groups.meets(body.groups)

@@ -1,4 +1,4 @@
-//! What queries ask of shapes. parry decides.
+//! Shape tests of queries, by parry.
 
 use glam::Vec3;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
@@ -9,10 +9,10 @@ use parry3d::shape::{HeightField, Shape as ParryShape, Triangle};
 use super::boxes::BoxRay;
 use crate::world::{Shape, seen_from};
 
-/// Distance and normal of the place where a ray meets a shape, which it may only from `enters` on, up to `most`.
+/// Distance and normal at which a ray meets a shape, between the distances `enters` and `most`.
 ///
-/// The search begins near the shape: parry squares the distance of the origin, so that a ball of 0.5 m, met from 10 km away, would have
-/// no radius.
+/// The search starts near the shape: parry squares the distance of the origin. From 10 km away, the radius of a ball of
+/// 0.5 m would vanish in rounding.
 pub(super) fn ray(shape: &Shape, pose: &Pose, ray: &BoxRay, [enters, most]: [f32; 2]) -> Option<(f32, Vec3)> {
     let start = begin(&shape.0.compute_aabb(pose), enters);
     let hit = shape.0.cast_ray_and_get_normal(pose, &Ray::new(ray.at(start), ray.direction), most - start, true)?;
@@ -21,8 +21,9 @@ pub(super) fn ray(shape: &Shape, pose: &Pose, ray: &BoxRay, [enters, most]: [f32
     Some((distance, if is_inside { -ray.direction } else { hit.normal }))
 }
 
-/// Where a ray that enters a box at a distance begins to be looked at: outside of the box by its diagonal, at a multiple of a power of two
-/// about as long, so that equal surfaces of different shapes stay equally far along an axis.
+/// Where the search starts for a ray that enters a box at distance `enters`: one box diagonal before the box, rounded
+/// to a multiple of a power of two of about that length. The rounding keeps equal surfaces of different shapes at equal
+/// distances along an axis.
 fn begin(aabb: &Aabb, enters: f32) -> f32 {
     let diagonal = (aabb.maxs - aabb.mins).length();
     let unit = f32::from_bits(diagonal.to_bits() & f32::INFINITY.to_bits());
@@ -34,7 +35,8 @@ pub(super) fn contains(shape: &Shape, pose: &Pose, point: Vec3) -> bool {
     !is_surface(&*shape.0) && shape.0.contains_point(pose, point)
 }
 
-/// Distance of a point from the surface of a shape, negative inside of it, with the nearest point of the surface and its normal.
+/// Distance from a point to the surface of a shape, negative inside the shape, with the nearest surface point and its
+/// normal.
 pub(super) fn closest(shape: &Shape, pose: &Pose, point: Vec3) -> Option<(f32, Vec3, Vec3)> {
     let found = shape.0.project_point(pose, point, false);
     let is_inside = found.is_inside && !is_surface(&*shape.0);
@@ -52,7 +54,7 @@ pub(super) fn closest(shape: &Shape, pose: &Pose, point: Vec3) -> Option<(f32, V
     (distance.is_finite() && on.is_finite()).then_some((distance, on, normal))
 }
 
-/// The normal of a surface at a point on it: that which rays from near by meet there.
+/// The normal of a surface at a point on it, from rays that start near the point.
 fn normal_at(shape: &Shape, pose: &Pose, point: Vec3) -> Vec3 {
     let near = 1e-3 * shape.bounding_radius() + 1e-5 * point.abs().max_element();
     let meets = |from: Vec3| {
@@ -69,7 +71,7 @@ pub(super) fn intersect((a, pose_a): (&Shape, &Pose), (b, pose_b): (&Shape, &Pos
     do_intersect((&*a.0, pose_a), (&*b.0, pose_b))
 }
 
-/// parry asks nothing of height fields but rays and points.
+/// For height fields, parry answers only ray and point queries.
 fn do_intersect((a, pose_a): (&dyn ParryShape, &Pose), (b, pose_b): (&dyn ParryShape, &Pose)) -> bool {
     if a.as_heightfield().is_none() && b.as_heightfield().is_some() {
         return do_intersect((b, pose_b), (a, pose_a));
@@ -85,8 +87,8 @@ fn do_intersect((a, pose_a): (&dyn ParryShape, &Pose), (b, pose_b): (&dyn ParryS
     query::intersection_test(pose_a, a, pose_b, b).is_ok_and(|answer| answer.intersecting)
 }
 
-/// Distance, point and normal of the place where a shape that moves along a ray meets another, which it may only from `enters` on, up to
-/// `most`.
+/// Distance, point and normal at which a shape that moves along a ray meets another shape, between the distances
+/// `enters` and `most`.
 pub(super) fn cast(
     (fixed, pose): (&Shape, &Pose),
     (moving, own): (&Shape, &Pose),
@@ -111,7 +113,7 @@ pub(super) fn cast(
     Some((start + hit.time_of_impact, pose * hit.witness1, normal))
 }
 
-/// parry counts the cells of a height field that a box covers, and cannot count those of a box beyond all sizes.
+/// Parry counts the cells of a height field that a box covers. It cannot count them for a box that is too large.
 fn do_cast(
     (fixed, pose): (&dyn ParryShape, &Pose),
     (moving, own): (&dyn ParryShape, &Pose),
@@ -135,7 +137,7 @@ fn do_cast(
     query::cast_shapes(pose, Vec3::ZERO, fixed, own, direction, moving, options).ok()?
 }
 
-/// Whether a shape has no inside. For parry a triangle contains its own points.
+/// Whether a shape has no inside. Parry treats the points of a triangle as inside it.
 fn is_surface(shape: &dyn ParryShape) -> bool {
     shape.as_trimesh().is_some() || shape.as_heightfield().is_some()
 }

@@ -1,4 +1,4 @@
-//! Where a walk writes to, or reads from.
+//! Archives: a walk over a value writes to one or reads from one.
 
 use std::any::Any;
 use std::collections::HashMap;
@@ -9,24 +9,26 @@ use rayon::prelude::*;
 use super::columns::Columns;
 use crate::error::{Result, ensure, input};
 
-/// Bytes that a walk writes, or reads back.
+/// A sequence of bytes that a walk writes or reads.
 pub(crate) trait Archive: Sized {
     /// Whether the walk reads.
     const READS: bool;
 
-    /// Writes these bytes, or reads them.
+    /// Writes or reads bytes.
     ///
     /// # Errors
-    /// There are not so many.
+    /// There are not enough bytes.
     fn bytes(&mut self, bytes: &mut [u8]) -> Result<()>;
 
-    /// Writes a number in groups of seven bits, or reads one.
+    /// Writes or reads a number in groups of seven bits.
     fn number(&mut self, number: &mut u64) -> Result<()>;
 
-    /// Writes the number of things that take a bit or more each, or reads it: no more than there are bits in all.
+    /// Writes or reads a count of things. Each thing takes at least one bit, so a count above the number of bits is
+    /// refused.
     fn count(&mut self, count: usize) -> Result<usize>;
 
-    /// Writes a value by `walk`, or reads it: values of the same address are written once, and read they share one address again.
+    /// Writes or reads a shared value by `walk`. Values with the same address are written once, and share one address
+    /// again after reading.
     fn shared<T: Clone + Send + Sync + 'static>(
         &mut self,
         value: &mut T,
@@ -34,13 +36,14 @@ pub(crate) trait Archive: Sized {
         walk: fn(&mut T, &mut Self) -> Result<()>,
     ) -> Result<()>;
 
-    /// Writes or reads what `walk` does. What has the same bytes as before takes a byte or two.
+    /// Writes or reads with `walk`. Content with the same bytes as earlier content takes a byte or two.
     fn repeated(&mut self, walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()>;
 
     /// Walks `count` things. A thing with the same bytes as the one before takes no space.
     fn runs(&mut self, count: usize, walk: impl FnMut(usize, &mut Self) -> Result<()>) -> Result<()>;
 
-    /// Writes so many things in columns, or reads them: [`CHUNK`] neighbors at a time, on all threads. Returns what `walk` makes of each chunk.
+    /// Writes or reads `count` things in columns, on all threads, [`CHUNK`] neighbors at a time. Returns the results of
+    /// `walk` for each chunk.
     fn chunks<T: Send>(
         &mut self,
         count: usize,
@@ -49,28 +52,29 @@ pub(crate) trait Archive: Sized {
     ) -> Result<Vec<T>>;
 }
 
-/// Things in columns that one task goes over. The bytes are the same for any number of threads.
+/// Number of things in one chunk. The bytes are the same for any number of threads.
 const CHUNK: usize = 2048;
 
-/// The chunks of so many things.
+/// The chunks of `count` things.
 fn chunks_of(count: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
     (0..count.div_ceil(CHUNK)).into_par_iter().map(move |chunk| chunk * CHUNK..((chunk + 1) * CHUNK).min(count))
 }
 
-/// Writes.
+/// An archive that writes.
 #[derive(Default)]
 pub(crate) struct Writer {
     pub bytes: Vec<u8>,
-    /// The shared values that are written, with their numbers, by their addresses: a value that is kept keeps its address.
+    /// The shared values that are already written, with their numbers, by address. Each is kept alive, so its address
+    /// stays unique.
     shared: HashMap<usize, (u64, Shared)>,
-    /// The numbers of bytes that were written once, the last such bytes, and memory for the next.
+    /// Numbers of byte strings that were already written, the last string, and memory for the next.
     repeated: HashMap<Vec<u8>, u64>,
     last: (Vec<u8>, u64),
     scratch: Vec<u8>,
 }
 
 impl Writer {
-    /// Writes behind bytes of another one, in which shared values stood.
+    /// Starts a writer after another one. It knows the shared values of that one.
     pub fn behind(other: Self) -> Self {
         Self { shared: other.shared, ..Self::default() }
     }
@@ -112,7 +116,7 @@ impl Archive for Writer {
         if number == next { walk(value, self) } else { Ok(()) }
     }
 
-    /// New bytes are a 0 and themselves; others are by how many new ones they came before the next.
+    /// New bytes are written as 0 and the bytes. Known bytes are written as the number of new strings since then.
     fn repeated(&mut self, mut walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()> {
         self.scratch.clear();
         std::mem::swap(&mut self.bytes, &mut self.scratch);
@@ -133,7 +137,7 @@ impl Archive for Writer {
         Ok(())
     }
 
-    /// Each run is its length, and then its bytes as [`Self::repeated`] writes them.
+    /// Each run is its length, then its bytes, in the format of [`Self::repeated`].
     fn runs(&mut self, count: usize, mut walk: impl FnMut(usize, &mut Self) -> Result<()>) -> Result<()> {
         let (mut run, mut own, mut next) = (0_u64, Vec::new(), Vec::new());
         for i in 0..=count {
@@ -179,10 +183,10 @@ impl Archive for Writer {
 /// A value that several things share.
 type Shared = Box<dyn Any + Send + Sync>;
 
-/// Reads.
+/// An archive that reads.
 pub(crate) struct Reader<'a> {
     rest: &'a [u8],
-    /// The number of all bytes.
+    /// Total number of bytes.
     length: usize,
     shared: Vec<Shared>,
     repeated: Vec<&'a [u8]>,
@@ -194,12 +198,12 @@ impl<'a> Reader<'a> {
         Self { rest: bytes, length: bytes.len(), shared: Vec::new(), repeated: Vec::new() }
     }
 
-    /// Reads these bytes, behind those of another one in which shared values stood.
+    /// Reads these bytes after those of another reader. It knows the shared values of that one.
     pub fn behind(other: Reader, bytes: &'a [u8]) -> Self {
         Self { rest: bytes, length: bytes.len(), shared: other.shared, repeated: Vec::new() }
     }
 
-    /// Whether all is read.
+    /// Whether all bytes are read.
     pub fn is_at_end(&self) -> bool {
         self.rest.is_empty()
     }

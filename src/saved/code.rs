@@ -1,21 +1,22 @@
-//! Numbers in as few bits as their sizes ask for.
+//! An entropy code for numbers.
 //!
-//! A number is a symbol, which says how large it is, and the bits below. Symbols take fewer bits the more frequent they are (Huffman's
-//! code, no more than [`MOST_BITS`]), and each takes one at least, so that no count promises more numbers than there are bits.
+//! A number is a symbol for its size, and the lower bits. Symbols have Huffman codes of at most [`MOST_BITS`] bits:
+//! frequent symbols are shorter. Each symbol takes at least one bit, so no count can announce more numbers than there
+//! are bits.
 
 use crate::error::{Result, ensure, input};
 
-/// Numbers by the places of their highest bits, without and with another sign than was guessed.
+/// Sizes of numbers by their highest bit, each with and without a sign that differs from the guess.
 const SIZES: u32 = 33;
-/// The first of the symbols of numbers in single precision: sign and exponent, and 23 bits below.
+/// The first symbol of single-precision numbers: sign and exponent, with 23 bits below.
 const FLOATS: u32 = 2 * SIZES;
-/// The first of the symbols of bytes.
+/// The first symbol of bytes.
 const BYTES: u32 = FLOATS + 512;
 const SYMBOLS: usize = (BYTES + 256) as usize;
-/// Most bits of a symbol.
+/// Largest number of bits of a symbol.
 const MOST_BITS: u32 = 10;
 
-/// A symbol, and the bits below it.
+/// A symbol and its lower bits.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Coded {
     symbol: u32,
@@ -52,7 +53,7 @@ impl Coded {
     }
 }
 
-/// How many bits stand below a symbol.
+/// Number of lower bits of a symbol.
 fn bits_below(symbol: u32) -> u32 {
     match symbol {
         0..FLOATS => (symbol % SIZES).saturating_sub(1),
@@ -61,7 +62,7 @@ fn bits_below(symbol: u32) -> u32 {
     }
 }
 
-/// Writes numbers behind `bytes`.
+/// Appends coded numbers to `bytes`.
 pub(super) fn encode(numbers: &[Coded], bytes: &mut Vec<u8>) {
     put(numbers.len() as u32, bytes);
     if numbers.is_empty() {
@@ -77,12 +78,12 @@ pub(super) fn encode(numbers: &[Coded], bytes: &mut Vec<u8>) {
         put((symbol - next) << 4 | length, bytes);
         next = symbol + 1;
     }
-    // Each symbol's code, and above it the length and the bits below, in the array of the counts.
+    // In the array of the counts: the code of each symbol, and above it its length and its number of lower bits.
     let mut codes = counts;
     for (code, length, symbol) in codes_of(used.iter().map(|&(symbol, _)| symbol).zip(lengths)) {
         codes[symbol as usize] = code | length << 16 | bits_below(symbol) << 24;
     }
-    // A number takes 41 bits at most. Each writes eight bytes, and the next one overwrites those that are not full.
+    // A number takes at most 41 bits. Write eight bytes for each number; the next one overwrites the unfilled bytes.
     let mut at = bytes.len();
     bytes.resize(at + 6 * numbers.len() + 8, 0);
     let (mut waiting, mut count) = (0_u64, 0);
@@ -99,7 +100,7 @@ pub(super) fn encode(numbers: &[Coded], bytes: &mut Vec<u8>) {
     bytes.truncate(at + usize::from(count > 0));
 }
 
-/// Reads numbers from where `bytes` begin, and leaves the others.
+/// Decodes numbers from the start of `bytes`, and leaves the rest.
 pub(super) fn decode(bytes: &mut &[u8]) -> Result<Vec<Coded>> {
     let count = get(bytes)? as usize;
     if count == 0 {
@@ -119,7 +120,8 @@ pub(super) fn decode(bytes: &mut &[u8]) -> Result<Vec<Coded>> {
     }
     let room: u32 = all.iter().map(|&(_, length)| 1 << (MOST_BITS - length)).sum();
     ensure(room <= 1 << MOST_BITS, || "more symbols than codes".to_owned())?;
-    // The symbol that begins with these bits, with its length and the bits below; 0 if there is none.
+    // For each bit pattern: the symbol that it starts with, its length and its number of lower bits; 0 if there is
+    // none.
     let mut table = [(0_u16, 0_u8, 0_u8); 1 << MOST_BITS];
     for (code, length, symbol) in codes_of(all.into_iter()) {
         for entry in table.iter_mut().skip(code as usize).step_by(1 << length) {
@@ -142,7 +144,7 @@ pub(super) fn decode(bytes: &mut &[u8]) -> Result<Vec<Coded>> {
     Ok(numbers)
 }
 
-/// At least 57 bits from the bit `at` on; behind the end they are 0.
+/// At least 57 bits from the bit `at` on. Bits beyond the end are 0.
 fn window(bytes: &[u8], at: usize) -> u64 {
     let own = bytes.get(at / 8..).unwrap_or_default();
     let word = match own.first_chunk::<8>() {
@@ -156,7 +158,7 @@ fn window(bytes: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(word) >> (at % 8)
 }
 
-/// The length of the code of each symbol, for symbols with their counts.
+/// The code length of each symbol, from counts.
 fn lengths(used: &[(u32, u32)]) -> Vec<u32> {
     let mut by_count: Vec<(u32, usize)> = used.iter().enumerate().map(|(i, &(_, count))| (count, i)).collect();
     by_count.sort_unstable();
@@ -165,19 +167,19 @@ fn lengths(used: &[(u32, u32)]) -> Vec<u32> {
         if lengths.iter().all(|&length| length <= MOST_BITS) {
             return lengths;
         }
-        // The order stays.
+        // The order does not change.
         by_count.iter_mut().for_each(|(count, _)| *count = (*count / 2) | 1);
         by_count.sort_unstable();
     }
 }
 
-/// Huffman's lengths, of symbols from the rarest on.
+/// Huffman code lengths of symbols, sorted by count.
 fn lengths_of_sorted(by_count: &[(u32, usize)]) -> Vec<u32> {
     let leaves = by_count.len();
     if leaves == 1 {
         return vec![1];
     }
-    // Leaves, and then the nodes above them in the order in which they come about, which is that of their weights.
+    // Leaves, then inner nodes in order of creation, which is also the order of their weights.
     let mut weights: Vec<u64> = by_count.iter().map(|&(count, _)| u64::from(count)).collect();
     let mut above = vec![0; 2 * leaves - 1];
     let (mut leaf, mut node) = (0, leaves);
@@ -201,7 +203,7 @@ fn lengths_of_sorted(by_count: &[(u32, usize)]) -> Vec<u32> {
     lengths
 }
 
-/// The code, its length and its symbol, for symbols with the lengths of their codes: shorter ones first, the first bit the lowest.
+/// Code, length and symbol, for symbols with code lengths: shorter codes first, the first bit is the lowest.
 fn codes_of(symbols: impl Iterator<Item = (u32, u32)>) -> impl Iterator<Item = (u32, u32, u32)> {
     let mut sorted: Vec<(u32, u32)> = symbols.map(|(symbol, length)| (length, symbol)).collect();
     sorted.sort_unstable();
@@ -222,7 +224,7 @@ fn put(mut number: u32, bytes: &mut Vec<u8>) {
     bytes.push(number as u8);
 }
 
-/// Reads one.
+/// Reads such a number.
 fn get(bytes: &mut &[u8]) -> Result<u32> {
     let mut number = 0;
     for shift in (0..35).step_by(7) {
@@ -280,7 +282,7 @@ mod tests {
         }
     }
 
-    /// Counts that grow as Fibonacci's numbers give the longest codes: 29 bits for 30 symbols.
+    /// Counts in the ratios of the Fibonacci numbers give the longest codes: 29 bits for 30 symbols.
     #[test]
     fn codes_are_not_too_long() {
         let (mut counts, mut numbers) = ([1, 1], Vec::new());

@@ -1,48 +1,48 @@
-//! Numbers of several kinds that belong to the same things: each kind stands by itself, so that it has a code of its own.
+//! Columns: numbers of one kind are stored together, so that each kind has its own code.
 
 use glam::Quat;
 
 use super::code::{Coded, decode, encode};
 use crate::error::{Result, ensure, input};
 
-/// Columns of numbers that are written, or read in the order in which they were written.
+/// Columns of numbers. They are read in the order in which they were written.
 pub(crate) struct Columns {
     all: Vec<Vec<Coded>>,
-    /// The next number of each that is read; none where they are written.
+    /// The next number to read in each column; `None` while writing.
     next: Option<Vec<usize>>,
 }
 
 impl Columns {
-    /// So many, to write, with room for as many numbers each as there are things.
+    /// New columns for writing, each with room for one number per thing.
     pub fn new(columns: usize, things: usize) -> Self {
         Self { all: (0..columns).map(|_| Vec::with_capacity(things)).collect(), next: None }
     }
 
-    /// So many, from their bytes.
+    /// Reads columns from bytes.
     pub fn read(columns: usize, mut bytes: &[u8]) -> Result<Self> {
         let all = (0..columns).map(|_| decode(&mut bytes)).collect::<Result<Vec<_>>>()?;
-        ensure(bytes.is_empty(), || "numbers of a kind that is not known".to_owned())?;
+        ensure(bytes.is_empty(), || "numbers of an unknown kind".to_owned())?;
         Ok(Self { all, next: Some(vec![0; columns]) })
     }
 
-    /// Their bytes.
+    /// Converts the columns to bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.all.iter().for_each(|column| encode(column, &mut bytes));
         bytes
     }
 
-    /// Whether they are read.
+    /// Whether the columns are for reading.
     pub fn reads(&self) -> bool {
         self.next.is_some()
     }
 
-    /// Whether all is read.
+    /// Whether all numbers are read.
     pub fn are_at_end(&self) -> bool {
         self.next.as_ref().is_none_or(|next| next.iter().zip(&self.all).all(|(next, column)| *next == column.len()))
     }
 
-    /// Writes a number, or reads one.
+    /// Writes or reads a number.
     #[inline(always)]
     fn coded(&mut self, column: usize, number: impl FnOnce() -> Coded) -> Result<Coded> {
         let Some(next) = &mut self.next else {
@@ -55,14 +55,14 @@ impl Columns {
         Ok(*number)
     }
 
-    /// One of few values.
+    /// Writes or reads one of few values.
     #[inline]
     pub fn byte(&mut self, column: usize, byte: &mut u8) -> Result<()> {
         *byte = self.coded(column, || Coded::byte(*byte))?.to_byte();
         Ok(())
     }
 
-    /// A number that is near a guess: the nearer, the fewer bits.
+    /// Writes or reads a number with a guess: the better the guess, the fewer bits.
     #[inline]
     pub fn index(&mut self, column: usize, value: &mut u32, guess: u32) -> Result<()> {
         let folded = |apart: i32| (apart << 1 ^ apart >> 31) as u32;
@@ -71,7 +71,7 @@ impl Columns {
         Ok(())
     }
 
-    /// The same by the bits, the sign apart.
+    /// The same for the bits of a float. The sign is separate.
     #[inline]
     pub fn near(&mut self, column: usize, value: &mut f32, guess: f32) -> Result<()> {
         const SIGN: u32 = 1 << 31;
@@ -87,15 +87,15 @@ impl Columns {
         Ok(())
     }
 
-    /// A number that has about the size of the others of its kind.
+    /// Writes or reads a number that has about the size of others of its kind.
     #[inline]
     pub fn float(&mut self, column: usize, value: &mut f32) -> Result<()> {
         *value = self.coded(column, || Coded::float(*value))?.to_float();
         Ok(())
     }
 
-    /// A rotation near another, in two columns. Its length is known, so that the component which is largest there follows from the others but for
-    /// rounding.
+    /// Writes or reads a rotation near another one, in two columns. Its length is known, so its largest component
+    /// follows from the others, except for rounding.
     pub fn near_rotation(&mut self, column: usize, rotation: &mut Quat, near: Quat) -> Result<()> {
         let (mut own, near) = (rotation.to_array(), near.to_array());
         let largest = (1..4).fold(0, |best, k| if near[k].abs() > near[best].abs() { k } else { best });

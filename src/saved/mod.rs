@@ -1,7 +1,7 @@
-//! State as bytes, and copies of state into memory that stands.
+//! Saves state as bytes, and copies state into reusable memory.
 //!
-//! One walk over the fields of a value writes it and reads it back ([`Saved`]). The walk names every field, so that a field that is added
-//! later does not compile until it is saved, or named as scratch: memory that every step uses again.
+//! One walk over the fields of a value both writes and reads it ([`Saved`]). The walk names every field: a new field
+//! does not compile until it is either saved or marked as scratch. Scratch is memory that every step overwrites.
 
 mod archive;
 mod code;
@@ -13,16 +13,16 @@ pub(crate) use columns::Columns;
 
 use crate::error::Result;
 
-/// State that goes into bytes and comes back bit by bit.
+/// State that can be saved as bytes and restored bit for bit.
 pub(crate) trait Saved: Sized {
     /// A value to read into.
     fn blank() -> Self;
 
-    /// Writes all fields, or reads them in place of what they are.
+    /// Writes all fields, or replaces them by fields that it reads.
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()>;
 }
 
-/// Implements [`Saved`] by the fields, in this order; those named as scratch stay as they are.
+/// Implements [`Saved`] by the fields, in this order. Scratch fields stay unchanged.
 macro_rules! fields {
     ($type:ty { $($field:ident),* $(,)? } $(scratch { $($scratch:ident),* $(,)? })?) => {
         impl $crate::saved::Saved for $type {
@@ -40,7 +40,7 @@ macro_rules! fields {
 }
 pub(crate) use fields;
 
-/// Implements `Clone` so that `clone_from` goes on with the memory that stands; scratch is not copied.
+/// Implements `Clone` so that `clone_from` reuses memory. Scratch is not copied.
 macro_rules! cloned {
     ($type:ty { $($field:ident),* $(,)? } $(scratch { $($scratch:ident),* $(,)? })?) => {
         impl Clone for $type {
@@ -67,7 +67,7 @@ macro_rules! state {
 }
 pub(crate) use state;
 
-/// Implements [`Saved`] for a kind without fields, by the places of its values in this list.
+/// Implements [`Saved`] for an enum without fields. A value is saved as its index in this list.
 macro_rules! kinds {
     ($type:ident { $first:ident $(, $value:ident)* $(,)? }) => {
         impl $crate::saved::Saved for $type {
@@ -91,14 +91,14 @@ macro_rules! kinds {
                     *self = Self::$value;
                     return Ok(());
                 })*
-                Err($crate::error::input!("{} of number {place} is not known", stringify!($type)))
+                Err($crate::error::input!("unknown {}: number {place}", stringify!($type)))
             }
         }
     };
 }
 pub(crate) use kinds;
 
-/// A hash of bytes: by words of eight, so that it takes less time than writing them.
+/// A hash of bytes. It works on words of eight bytes, so that it takes less time than writing them.
 pub(crate) fn hash_of(bytes: &[u8]) -> u64 {
     let (words, rest) = bytes.as_chunks::<8>();
     let mut last = [0; 8];

@@ -1,4 +1,4 @@
-//! Numbers, vectors and collections.
+//! Saves numbers, vectors and collections.
 
 use std::collections::{BTreeMap, HashSet};
 use std::hash::{BuildHasher, Hash};
@@ -10,7 +10,7 @@ use parry3d::math::Pose;
 use super::{Archive, Saved};
 use crate::error::{Result, input};
 
-/// Numbers by their bytes, the least first.
+/// Numbers by their bytes, little-endian.
 macro_rules! by_bytes {
     ($($type:ty),*) => {
         $(impl Saved for $type {
@@ -29,7 +29,7 @@ macro_rules! by_bytes {
 }
 by_bytes!(u8, f32, f64);
 
-/// Numbers that are small most of the time.
+/// Numbers that are usually small.
 macro_rules! by_size {
     ($($type:ty),*) => {
         $(impl Saved for $type {
@@ -170,7 +170,7 @@ impl Saved for String {
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         let mut bytes = std::mem::take(self).into_bytes();
         bytes.walk(archive)?;
-        *self = Self::from_utf8(bytes).map_err(|_| input!("a name that is no text"))?;
+        *self = Self::from_utf8(bytes).map_err(|_| input!("a name is not valid text"))?;
         Ok(())
     }
 }

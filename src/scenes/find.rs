@@ -1,4 +1,4 @@
-//! A scene by the name of a catalogue entry or of a file, and many worlds of it.
+//! Finds a scene by the name of a catalogue entry or of a file, and builds many worlds of it.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::memory;
 use crate::suggest::hint;
 
 impl Scene {
-    /// Finds a scene by its catalogue name, else reads the file of that name, for which the feature `serde` is needed.
+    /// Finds a scene by its catalogue name, else reads the file of that name, which needs the feature `serde`.
     /// `parameters` are `key=value`.
     ///
     /// ```
@@ -24,7 +24,8 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// Neither a known name nor a readable scene file; an unknown parameter or an impossible value.
+    /// There is neither a scene nor a readable scene file of that name, or a parameter is unknown or has an impossible
+    /// value.
     pub fn find(name_or_path: &str, parameters: &[String]) -> Result<Self> {
         match CATALOGUE.iter().find(|e| e.name == name_or_path) {
             Some(entry) => entry.build(parameters),
@@ -32,8 +33,9 @@ impl Scene {
         }
     }
 
-    /// `count` worlds of a scene as one, whose bodies never meet: see [`World::beside`](crate::World::beside). All are the
-    /// same, or, with `vary`, each has one more of that parameter than the one before.
+    /// `count` worlds of a scene in one world; bodies of different worlds never meet: see
+    /// [`World::beside`](crate::World::beside). All worlds are equal. With `vary`, that parameter is one larger in each
+    /// world than in the one before.
     ///
     /// ```
     /// let towers = drystone::Scene::find_worlds("tower", &["n=4".into()], 3, Some("n"))?;
@@ -43,11 +45,12 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// As [`Scene::find`]; no world, more than four million worlds or dynamic bodies, or nothing of that name that is a whole number.
+    /// Those of [`Scene::find`]; there is no world, or more than four million worlds or dynamic bodies; or `vary` names
+    /// no parameter that is a whole number.
     pub fn find_worlds(name_or_path: &str, parameters: &[String], count: usize, vary: Option<&str>) -> Result<Self> {
         let mut all = Self::find(name_or_path, parameters)?;
         let each = all.world.dynamic_count();
-        // A world without dynamic bodies takes memory and time all the same.
+        // A world without dynamic bodies also takes memory and time.
         ensure(count > 0 && each.max(1).saturating_mul(count) <= MOST_BODIES as usize, || {
             format!(
                 "{count} worlds of {each} dynamic bodies: must be at least one world, at most {MOST_BODIES} worlds, and at most {MOST_BODIES} such bodies in all"
@@ -81,8 +84,8 @@ impl Scene {
         Ok(all)
     }
 
-    /// Finds a scene by one word, `name:key=value,...`: its parameters, how many `worlds` of it, and what to `vary`, each as in
-    /// [`Scene::find_worlds`].
+    /// Finds a scene by one word, `name:key=value,...`: its parameters, the number of `worlds`, and the parameter to
+    /// `vary`, as in [`Scene::find_worlds`].
     ///
     /// ```
     /// let towers = drystone::Scene::find_spec("tower:n=4,worlds=3,vary=n")?;
@@ -91,7 +94,7 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// As there; worlds that are not a number.
+    /// Those of [`Scene::find_worlds`]; or `worlds` is not a number.
     pub fn find_spec(spec: &str) -> Result<Self> {
         let (name, parameters) = spec.split_once(':').unwrap_or((spec, ""));
         let (mut count, mut vary, mut own) = (1, None, Vec::new());
@@ -108,7 +111,8 @@ impl Scene {
         Self::find_worlds(name, &own, count, vary)
     }
 
-    /// Sets the world of another scene beside the world of this scene. A container or a promise to stand remains if both scenes have it.
+    /// Appends the world of another scene. The container, and the expectation to stand, remain only if both scenes have
+    /// them.
     fn beside(&mut self, other: &Self) {
         let (first, worlds) = (self.world.bodies.len(), self.world.world_count());
         let spawner = |s: &Spawner| Spawner { world: worlds + s.world, ..s.clone() };
@@ -122,7 +126,7 @@ impl Scene {
     }
 }
 
-/// Reads a scene file, or says that there is neither a scene nor a file of that name.
+/// Reads a scene file. The error says that there is neither a scene nor a file of that name.
 fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
     let path = Path::new(name_or_path);
     if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
@@ -137,7 +141,7 @@ fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
 
 #[cfg(not(feature = "serde"))]
 fn load(path: &Path) -> Result<Scene> {
-    Err(input!("{}: a scene file: drystone was built without the feature serde, which reads it", path.display()))
+    Err(input!("{}: cannot read a scene file: drystone was built without the feature serde", path.display()))
 }
 
 /// The value of a parameter that is a whole number.

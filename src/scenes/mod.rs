@@ -1,4 +1,4 @@
-//! Scenes: a world, the length of a step, and what should hold at the end.
+//! Scenes: a world, the length of a step, and the expected outcome.
 
 mod catalogue;
 #[cfg(feature = "serde")]

@@ -1,4 +1,4 @@
-//! A scene: a world, the length of a step, and what should hold at the end.
+//! A scene: a world, the length of a step, and the expected outcome.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::spawner::{Leaves, Spawner};
 use crate::world::World;
 
-/// A world, with what a run needs to know about it.
+/// A world, with the data that a run needs.
 ///
 /// ```
 /// use drystone::{Body, Scene, Shape, World, glam::Vec3};
@@ -30,17 +30,17 @@ pub struct Scene {
     pub world: World,
     /// Length of a step (s).
     pub dt: f32,
-    /// Steps of a run that asks for none.
+    /// Default number of steps of a run.
     pub steps: u32,
-    /// Lower and upper corner of the space that no dynamic body should leave (m), if the scene has one.
+    /// Lower and upper corner of the space that no dynamic body should leave (m), or `None`.
     pub container: Option<(Vec3, Vec3)>,
     /// Whether every dynamic body should still be in place at the end.
     pub stands: bool,
-    /// Bodies that stand or fall together; empty if the scene names none.
+    /// Groups of bodies that stand or fall together; empty if the scene has none.
     pub groups: Vec<Group>,
-    /// What brings bodies while the scene runs; [`Spawners`](super::Spawners) drives them.
+    /// Spawners, which add bodies while the scene runs; [`Spawners`](super::Spawners) runs them.
     pub spawners: Vec<Spawner>,
-    /// Bodies of the world that leave while the scene runs, by their indices.
+    /// Bodies of the world that leave while the scene runs, by index.
     pub leaving: Vec<(usize, Leaves)>,
 }
 
@@ -56,14 +56,14 @@ pub struct Scene {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Group {
-    /// Name for people.
+    /// Name for reports.
     pub name: String,
     /// Their indices.
     pub bodies: Range<usize>,
 }
 
 impl Scene {
-    /// A scene at 60 steps a second, without a container, whose bodies need not stand.
+    /// A scene with 60 steps a second, without a container. Its bodies need not stand.
     pub fn new(name: impl Into<String>, world: World, steps: u32) -> Self {
         Self {
             name: name.into(),
@@ -78,13 +78,13 @@ impl Scene {
         }
     }
 
-    /// Says that every dynamic body should still be in place at the end.
+    /// Marks the scene as one in which every dynamic body should still be in place at the end.
     pub fn standing(mut self) -> Self {
         self.stands = true;
         self
     }
 
-    /// Dynamic bodies whose center of mass is outside the container.
+    /// Number of dynamic bodies whose center of mass is outside the container.
     pub fn escaped(&self, world: &World) -> usize {
         let Some((low, high)) = self.container else { return 0 };
         world.dynamic().map(|b| b.center_of_mass()).filter(|c| !(c.cmpge(low).all() && c.cmple(high).all())).count()

@@ -1,9 +1,9 @@
-//! Bodies that come and go while a scene runs.
+//! Bodies that a scene adds and removes while it runs.
 
 use crate::world::Body;
 
-/// Brings bodies that are alike: one every so many steps, at the same place with the same velocity. It waits while that place holds a body
-/// that is not fixed and that the new one would push.
+/// Adds equal bodies at a regular interval, at the same place with the same velocity. A spawner waits while its place
+/// overlaps a body that the new one would push, unless that body is fixed.
 ///
 /// ```
 /// use drystone::{Body, Scene, Shape, World, scenes::{Leaves, Spawner}};
@@ -16,22 +16,23 @@ use crate::world::Body;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Spawner {
-    /// The body as it comes.
+    /// The body at its start.
     pub body: Body,
-    /// When each of them leaves.
+    /// When each of these bodies leaves.
     pub leaves: Leaves,
-    /// Steps before the first comes.
+    /// Steps before the first body.
     pub first: u32,
-    /// Steps from one to the next, at least; 0 is taken as 1.
+    /// Smallest number of steps from one body to the next; 0 counts as 1.
     pub every: u32,
-    /// How many come in all; none for no end.
+    /// Total number of bodies, or `None` for no limit.
     pub count: Option<u32>,
-    /// Which of the worlds beside each other they come into; none come where there is no such world.
+    /// Index of the world that they enter, if several stand beside each other. If there is no such world, no bodies are
+    /// added.
     pub world: usize,
 }
 
 impl Spawner {
-    /// A spawner that brings a body before the first step, and one after every `every` steps.
+    /// A spawner that adds a body before the first step, and one every `every` steps.
     pub fn new(body: Body, every: u32) -> Self {
         Self { body, leaves: Leaves::default(), first: 0, every, count: None, world: 0 }
     }
@@ -46,8 +47,8 @@ impl Spawner {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Leaves {
-    /// As soon as its center of mass is below this height (m).
+    /// It leaves as soon as its center of mass is below this height (m).
     pub below: Option<f32>,
-    /// After this time (s).
+    /// It leaves after this time (s).
     pub after: Option<f32>,
 }

@@ -1,11 +1,11 @@
-//! The bodies of a scene come and go while it runs.
+//! Adds and removes the bodies of a scene while it runs.
 
 use super::scene::Scene;
 use super::spawner::{Leaves, Spawner};
 use crate::queries::{Filter, Queries};
 use crate::world::{Body, BodyHandle, BodyKind, World, placed, pose};
 
-/// Lets the bodies of a scene come and go. The calls alone decide which index a body has.
+/// Adds and removes the bodies of a scene. The index of a body depends only on the calls.
 ///
 /// ```
 /// use drystone::scenes::{Leaves, Spawner, Spawners};
@@ -28,32 +28,32 @@ use crate::world::{Body, BodyHandle, BodyKind, World, placed, pose};
 #[derive(Clone, Debug, Default)]
 pub struct Spawners {
     spawners: Vec<Spawner>,
-    /// Bodies that came by each.
+    /// Number of bodies that each spawner added.
     brought: Vec<u32>,
-    /// The step before which the next body of each comes at the earliest.
+    /// Step number before which the next body of each spawner is due.
     due: Vec<u32>,
-    /// Bodies that may leave.
+    /// Bodies that can leave.
     staying: Vec<Staying>,
     steps: u32,
     left: u32,
 }
 
-/// A body that may leave.
+/// A body that can leave.
 #[derive(Clone, Copy, Debug)]
 struct Staying {
     body: BodyHandle,
     leaves: Leaves,
-    /// Steps before it came.
+    /// Number of steps before it was added.
     came: u32,
 }
 
 impl Staying {
-    /// How long it has been there (s).
+    /// Age of the body (s).
     fn age(&self, steps: u32, dt: f32) -> f64 {
         f64::from(steps - self.came) * f64::from(dt)
     }
 
-    /// Whether it leaves, being where it is.
+    /// Whether the body leaves at its present place.
     fn is_due(&self, body: &Body, steps: u32, dt: f32) -> bool {
         // A time is a whole number of steps only within rounding.
         let is_late = |after: f32| self.age(steps, dt) >= f64::from(after) * (1.0 - 1e-6);
@@ -62,7 +62,7 @@ impl Staying {
 }
 
 impl Spawners {
-    /// Those of a scene that has not run yet.
+    /// The spawners of a scene before its first step.
     pub fn new(scene: &Scene) -> Self {
         let staying = |&(body, leaves): &(usize, Leaves)| {
             Some(Staying { body: scene.world.bodies.handle(body)?, leaves, came: 0 })
@@ -76,9 +76,10 @@ impl Spawners {
         }
     }
 
-    /// Takes out the bodies that leave before a step of `dt` seconds, then brings those that come, spawner by spawner. A body whose place is taken
-    /// comes before the first step in which it is free, and the next one as many steps later. A scene without either costs nothing; each body
-    /// that is due costs a look at all bodies.
+    /// Removes the bodies that leave before a step of `dt` seconds, then adds new bodies, spawner by spawner. If the
+    /// place of a new body is occupied, it enters before the first step with a free place, and the interval to the next
+    /// body counts from then. A scene without spawners and leaving bodies costs nothing; each due body costs a look at
+    /// all bodies.
     pub fn before_step(&mut self, world: &mut World, dt: f32) {
         let (steps, left) = (self.steps, &mut self.left);
         self.staying.retain(|staying| match world.body(staying.body) {
@@ -102,17 +103,17 @@ impl Spawners {
         self.steps += 1;
     }
 
-    /// Bodies that came so far.
+    /// Number of bodies that were added so far.
     pub fn came(&self) -> u32 {
         self.brought.iter().sum()
     }
 
-    /// Bodies that left so far.
+    /// Number of bodies that left so far.
     pub fn left(&self) -> u32 {
         self.left
     }
 
-    /// What a scene needs to go on from here: the spawners, and the bodies that leave.
+    /// The spawners and the leaving bodies that a scene needs to continue from here.
     ///
     /// ```
     /// # use drystone::{Body, Scene, World, scenes::{Spawner, Spawners}};
@@ -138,12 +139,12 @@ impl Spawners {
     }
 }
 
-/// Whether all bodies of a spawner came.
+/// Whether a spawner has added all its bodies.
 fn is_done(spawner: &Spawner, brought: u32) -> bool {
     spawner.count.is_some_and(|count| brought >= count)
 }
 
-/// Whether the next body of a spawner would overlap none that it would push and that may move away.
+/// Whether the next body of a spawner overlaps no body that it would push, except fixed ones.
 fn is_free(spawner: &Spawner, world: &World) -> bool {
     let Spawner { body, world: part, .. } = spawner;
     let may_leave = |_, other: &Body| match other.kind {

@@ -1,4 +1,4 @@
-//! A shape whose contacts cannot be computed, as a mistake in parry would make one.
+//! Tests with a shape whose contacts cannot be computed, as after a bug in parry.
 
 use glam::Vec3;
 use parry3d::bounding_volume::{Aabb, BoundingSphere};
@@ -13,7 +13,7 @@ use crate::simulation::{Event, Listen, Simulation};
 use crate::stats::StepStats;
 use crate::world::{Body, World};
 
-/// A ball that does not answer what its surface is.
+/// A ball that panics when it is asked for its surface.
 #[derive(Clone)]
 struct Bad(Ball);
 
@@ -67,7 +67,7 @@ impl PointQuery for Bad {
 
 const DT: f32 = 1.0 / 60.0;
 
-/// A tower beside which a bad ball falls onto a slab.
+/// A tower on a slab, and a bad ball that falls onto the slab beside it.
 fn begun() -> Simulation {
     let mut world = World::new();
     world
@@ -85,7 +85,7 @@ fn begun() -> Simulation {
     simulation
 }
 
-/// The steps before the first that fails, and its error.
+/// The number of steps before the first one that fails, and its error.
 fn failed(simulation: &mut Simulation) -> (u32, Error) {
     let mut step = |_: &u32| -> Option<Result<StepStats>> { Some(simulation.step(DT)) };
     (0..60).find_map(|k| step(&k)?.err().map(|error| (k, error))).expect("the bad ball meets the slab")
@@ -106,7 +106,7 @@ fn a_shape_that_cannot_be_computed_is_an_error_that_names_its_body_and_leaves_th
                 line.contains("\"slab\"") && line.contains("5 \"culprit\"") && line.ends_with("no surface"),
                 "{line}"
             );
-            // Once more the same, and nothing has moved.
+            // The same step fails again, and nothing moved.
             assert_eq!(simulation.step(DT).expect_err("as before").to_string(), line);
             assert!(simulation.next_problem(DT).is_err_and(|error| error.to_string() == line));
             assert_eq!(simulation.hash(), hash);
@@ -116,7 +116,7 @@ fn a_shape_that_cannot_be_computed_is_an_error_that_names_its_body_and_leaves_th
     assert_eq!(lines[0], lines[1]);
 }
 
-/// Without the culprit the run goes on as one that begins there.
+/// After the bad body is removed, the run continues like a run that starts there.
 #[test]
 fn a_run_goes_on_without_what_could_not_be_computed() {
     let mut simulation = begun();

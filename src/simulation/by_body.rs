@@ -1,15 +1,15 @@
-//! Which contacts each body has.
+//! The contacts of each body.
 
 /// The rows of the contacts of each body.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ByBody {
-    /// Where the rows of each body begin, and where those of the last end.
+    /// Where the rows of each body begin, and the end of the last one.
     begins: Vec<u32>,
     rows: Vec<u32>,
 }
 
 impl ByBody {
-    /// Lists the contacts of `bodies` bodies: the rows, each with two bodies.
+    /// Lists the contacts of `bodies` bodies. Each contact has a row and two bodies.
     pub fn list(&mut self, bodies: usize, contacts: impl Iterator<Item = (usize, [u32; 2])> + Clone) {
         self.begins.clear();
         self.begins.resize(bodies + 2, 0);
@@ -21,7 +21,7 @@ impl ByBody {
         }
         self.rows.clear();
         self.rows.resize(self.begins.last().map_or(0, |&end| end as usize), 0);
-        // The entry after that of a body is where its next row goes, and in the end where its rows end.
+        // The entry after that of a body holds the place of its next row, and in the end the place where its rows end.
         for (row, pair) in contacts {
             for body in pair {
                 let next = &mut self.begins[body as usize + 1];
@@ -31,13 +31,13 @@ impl ByBody {
         }
     }
 
-    /// Forgets all.
+    /// Discards the lists.
     pub fn forget(&mut self) {
         self.begins.clear();
         self.rows.clear();
     }
 
-    /// The rows of the contacts of a body; none if no lists were made.
+    /// The rows of the contacts of a body, or `None` if no lists exist.
     pub fn of(&self, body: usize) -> Option<&[u32]> {
         if self.begins.is_empty() {
             return None;

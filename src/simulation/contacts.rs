@@ -1,4 +1,5 @@
-//! The contacts of the last step for callers to read while the simulation is borrowed: what the host knows without asking a device.
+//! The contacts of the last step, for callers that borrow the simulation. Only data on the host is used, no device is
+//! asked.
 
 use glam::Vec3;
 
@@ -31,7 +32,7 @@ pub struct Contact {
     pub b: ColliderOf,
     /// Unit normal from a to b, world axes.
     pub normal: Vec3,
-    /// Impulse on b of the whole step, normal and friction of all points (N s); zero unless the simulation
+    /// Impulse on b over the whole step: normal and friction of all points (N s). It is zero unless the simulation
     /// [listens](crate::Simulation::listen).
     pub impulse: Vec3,
     points: [ContactPoint; MAX_POINTS],
@@ -54,27 +55,28 @@ pub struct Contact {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactPoint {
-    /// Midway between the surfaces, where the bodies are now (m).
+    /// Midway between the surfaces, at the present poses of the bodies (m).
     pub position: Vec3,
-    /// Distance along the normal when the step began, negative when overlapping (m).
+    /// Distance along the normal at the start of the step, negative for overlap (m).
     pub separation: f32,
-    /// Normal impulse on b of the whole step (N s); zero unless the simulation listens.
+    /// Normal impulse on b over the whole step (N s); zero unless the simulation listens.
     pub impulse: f32,
 }
 
 impl Contact {
-    /// Its points, 1 to 4.
+    /// The contact points, 1 to 4.
     pub fn points(&self) -> &[ContactPoint] {
         &self.points[..self.count]
     }
 
-    /// Whether the bodies touch, by the rule of [`Simulation::events`](crate::Simulation::events), where the simulation listens.
+    /// Whether the bodies touch, by the rule of [`Simulation::events`](crate::Simulation::events). Needs a simulation
+    /// that listens.
     pub fn touches(&self) -> bool {
         self.points().iter().any(|point| point.impulse > 0.0 || point.separation <= 0.0)
     }
 }
 
-/// The contact in a row; none where one of its bodies went since the step.
+/// The contact in a row, or `None` if one of its bodies was removed since the step.
 pub(super) fn contact(stages: &Stages, world: &World, row: usize) -> Option<Contact> {
     let Stages { detector, contacts, problem, .. } = stages;
     let (from, [on_a, on_b]) = (problem.contacts.get(row)?, contacts.colliders_of(row));

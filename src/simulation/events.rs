@@ -1,4 +1,4 @@
-//! What a step tells of the bodies that meet.
+//! The events of a step.
 
 use glam::Vec3;
 
@@ -6,10 +6,11 @@ use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
 use crate::world::{BodyHandle, JointHandle};
 
-/// What a simulation listens to: [`Simulation::listen`](crate::Simulation::listen). Whatever is off costs nothing.
+/// The events that a simulation reports: see [`Simulation::listen`](crate::Simulation::listen). An option that is off
+/// costs nothing.
 ///
-/// Each of the three adds up impulses over the substeps of a step, so that
-/// [`SolvedPoint::summed`](crate::SolvedPoint::summed) is there.
+/// Each of the three options makes a step sum impulses over its substeps, so that
+/// [`SolvedPoint::summed`](crate::SolvedPoint::summed) is available.
 ///
 /// ```
 /// use drystone::{Listen, Reference, Simulation, SolverConfig, World};
@@ -22,18 +23,19 @@ use crate::world::{BodyHandle, JointHandle};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Listen {
-    /// Whether steps tell of contacts that began or ended.
+    /// Whether steps report contacts that began or ended.
     pub contacts: bool,
-    /// The approach speed above which steps tell of hits, 0 or more (m/s); none for no hits. What rests approaches at up to some mm/s.
+    /// The approach speed above which steps report hits, 0 or more (m/s); `None` reports no hits. Bodies at rest
+    /// approach at up to a few mm/s.
     pub hits_above: Option<f32>,
-    /// Whether impulses are added up for [`Simulation::contacts_of`](crate::Simulation::contacts_of), without any event.
+    /// Whether steps sum impulses for [`Simulation::contacts_of`](crate::Simulation::contacts_of), without any event.
     pub impulses: bool,
 }
 
 crate::saved::fields!(Listen { contacts, hits_above, impulses });
 
 impl Listen {
-    /// Whether impulses are to be summed.
+    /// Whether steps sum impulses.
     pub(super) fn sums(&self) -> bool {
         self.contacts || self.impulses || self.hits_above.is_some()
     }
@@ -44,7 +46,7 @@ impl Listen {
     }
 }
 
-/// A collider, by its body and its place among the colliders of that body.
+/// A collider: its body, and its index on that body.
 ///
 /// ```
 /// use drystone::{Body, ColliderOf, Reference, Shape, Simulation, SolverConfig, World};
@@ -60,7 +62,7 @@ impl Listen {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ColliderOf {
-    /// The body. The handle is stale where the body was removed.
+    /// The body. The handle is stale if the body was removed.
     pub body: BodyHandle,
     /// Index in [`Body::colliders`](crate::Body::colliders).
     pub collider: usize,
@@ -68,7 +70,7 @@ pub struct ColliderOf {
 
 crate::saved::fields!(ColliderOf { body, collider });
 
-/// Something that happened in a step; see [`Simulation::events`](crate::Simulation::events).
+/// An event of a step; see [`Simulation::events`](crate::Simulation::events).
 ///
 /// ```
 /// # use drystone::{Body, Event, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
@@ -94,50 +96,51 @@ crate::saved::fields!(ColliderOf { body, collider });
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
-    /// Two colliders touch that did not touch in the step before.
+    /// Two colliders began to touch in this step.
     Began {
-        /// That of the body with the lesser index.
+        /// The collider of the body with the smaller index.
         a: ColliderOf,
-        /// The other one.
+        /// The other collider.
         b: ColliderOf,
     },
-    /// Two colliders no longer touch, or one of them is gone.
+    /// Two colliders no longer touch, or one of them was removed.
     Ended {
-        /// That of the body with the lesser index.
+        /// The collider of the body with the smaller index.
         a: ColliderOf,
-        /// The other one.
+        /// The other collider.
         b: ColliderOf,
     },
-    /// Two colliders met fast.
+    /// Two colliders met at high speed.
     Hit(Hit),
-    /// A collider overlaps a sensor that did not when the step began.
+    /// A collider began to overlap a sensor in this step.
     Entered {
         /// The sensor.
         sensor: ColliderOf,
         /// The other collider.
         visitor: ColliderOf,
     },
-    /// A collider no longer overlaps a sensor, or one of them is gone.
+    /// A collider no longer overlaps a sensor, or one of them was removed.
     Left {
         /// The sensor.
         sensor: ColliderOf,
         /// The other collider.
         visitor: ColliderOf,
     },
-    /// A collider flew through a sensor: they overlapped neither when the step began nor at its end.
+    /// A collider flew through a sensor: they overlapped neither at the start of the step nor at its end.
     Passed {
         /// The sensor.
         sensor: ColliderOf,
         /// The other collider.
         visitor: ColliderOf,
-        /// When the collider met the sensor, from the begin of the step on (s).
+        /// When the collider met the sensor, from the start of the step (s).
         time: f32,
     },
-    /// A joint bore more than its [`break_force`](crate::Joint::break_force), and is gone from the world.
+    /// A joint carried more than its [`break_force`](crate::Joint::break_force), and the step removed it from the
+    /// world.
     Broke {
         /// The joint. The handle is stale.
         joint: JointHandle,
-        /// What the joint bore, the mean over the step (N).
+        /// The force that the joint carried, averaged over the step (N).
         force: f32,
     },
 }
@@ -163,32 +166,33 @@ pub enum Event {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// That of the body with the lesser index.
+    /// The collider of the body with the smaller index.
     pub a: ColliderOf,
-    /// The other one.
+    /// The other collider.
     pub b: ColliderOf,
-    /// Where the surfaces approach fastest of all points that bear something, midway between them when the step begins (m).
+    /// The contact point with the highest approach speed among points that carry an impulse, midway between the
+    /// surfaces at the start of the step (m).
     pub point: Vec3,
-    /// Unit normal there, from a to b.
+    /// Unit normal at the point, from a to b.
     pub normal: Vec3,
-    /// Speed there along the normal when the surfaces meet, 0 or more (m/s).
+    /// Approach speed along the normal at the point when the surfaces meet, 0 or more (m/s).
     pub speed: f32,
-    /// Sum of the normal impulses of all its points over all substeps of the step (N s). Where a step ends amid a hit, the next one tells of the
-    /// hit, with the impulse of both.
+    /// Sum of the normal impulses of all points over all substeps of the step (N s). If a step ends during a hit, the
+    /// next step reports the hit with the impulse of both steps.
     pub impulse: f32,
 }
 
 crate::saved::fields!(Hit { a, b, point, normal, speed, impulse });
 
-/// Two colliders that touch, the body with the lesser index first.
+/// Two colliders that touch. The body with the smaller index comes first.
 pub(super) type Touch = [ColliderOf; 2];
 
-/// Pairs of colliders from step to step: those of this step and of the step before, ascending.
+/// Pairs of colliders of this step and of the step before, sorted.
 #[derive(Debug, Default)]
 pub(super) struct Touches {
     now: Vec<Touch>,
     before: Vec<Touch>,
-    /// Those of this step as they came, and those of the step before.
+    /// The pairs of this step in the order of arrival, and those of the step before.
     found: Vec<Touch>,
     found_before: Vec<Touch>,
 }
@@ -196,13 +200,13 @@ pub(super) struct Touches {
 crate::saved::state!(Touches { now, found } scratch { before, found_before });
 
 impl Touches {
-    /// Takes over the pairs of a step, in any order and as often as they come; calls `tell` on each that is new, and on each that is gone,
-    /// ascending.
+    /// Takes the pairs of a step, in any order and with repetitions. It calls `tell` for each pair that is new and for
+    /// each pair that is gone, in sorted order.
     pub fn follow(&mut self, pairs: impl Iterator<Item = Touch>, mut tell: impl FnMut(Touch, bool)) {
         std::mem::swap(&mut self.found, &mut self.found_before);
         self.found.clear();
         self.found.extend(pairs);
-        // In a settled world the pairs are those of the step before, in the same order.
+        // In a settled world, the pairs are usually the same in the same order.
         if self.found == self.found_before {
             return;
         }
@@ -225,14 +229,15 @@ impl Touches {
         }
     }
 
-    /// Forgets all.
+    /// Discards all pairs.
     pub fn forget(&mut self) {
         self.now.clear();
         self.found.clear();
     }
 }
 
-/// A hit, and the share of its speed that is left after the step; none of a hit that began in the step before.
+/// A hit, and the share of its speed that remains after the step. The share is `None` for a hit that began in the step
+/// before.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Met {
     pub hit: Hit,
@@ -241,16 +246,17 @@ pub(super) struct Met {
 
 crate::saved::fields!(Met { hit, left });
 
-/// A hit waits for the rest of its impulse while more than this share of its speed is left.
+/// While more than this share of the approach speed remains after a step, the hit waits for the next step before it is
+/// reported.
 const UNFINISHED: f32 = 0.01;
 
-/// The events of the last step, and what they follow from.
+/// The events of the last step, and the state to derive them.
 #[derive(Debug, Default)]
 pub(super) struct Events {
     pub listen: Listen,
     pub all: Vec<Event>,
     contacts: Touches,
-    /// Hits of this step, and those of the step before that were not over.
+    /// Hits of this step, and hits of the step before that were not complete.
     pub met: Vec<Met>,
     unfinished: Vec<Met>,
     inside: Touches,
@@ -258,7 +264,7 @@ pub(super) struct Events {
 
 crate::saved::cloned!(Events { listen, all, contacts, met, unfinished, inside });
 
-/// A state that is read has no events: they are those of a step.
+/// Loaded state has no events: events belong to one step.
 impl Saved for Events {
     fn blank() -> Self {
         Self::default()
@@ -274,7 +280,7 @@ impl Saved for Events {
 }
 
 impl Events {
-    /// Listens to something else from the next step on.
+    /// Sets the events to report from the next step on.
     pub fn listen(&mut self, listen: Listen) {
         self.unfinished.clear();
         if !listen.contacts {
@@ -283,7 +289,7 @@ impl Events {
         self.listen = listen;
     }
 
-    /// Notes the pairs that touch in a step, in any order.
+    /// Records the pairs that touch in a step, in any order.
     pub fn note_contacts(&mut self, touching: impl Iterator<Item = Touch>) {
         let all = &mut self.all;
         self.contacts.follow(touching, |[a, b], is_new| {
@@ -291,7 +297,7 @@ impl Events {
         });
     }
 
-    /// Notes the sensors and the colliders that overlap after a step, in any order.
+    /// Records the sensors and the colliders that overlap them after a step, in any order.
     pub fn note_overlaps(&mut self, overlaps: impl Iterator<Item = Touch>) {
         let all = &mut self.all;
         self.inside.follow(overlaps, |[sensor, visitor], is_new| {
@@ -299,29 +305,31 @@ impl Events {
         });
     }
 
-    /// Notes the sensors and the colliders that met them on their ways through a step, ascending, with the times; after those that overlap.
+    /// Records the sensors and the colliders that passed through them in a step, sorted, with the times. Call it after
+    /// `note_overlaps`.
     pub fn note_passed(&mut self, passed: impl Iterator<Item = (Touch, f32)>) {
         let is_inside = |pair: &Touch| self.inside.now.binary_search(pair).is_ok();
         let flew = passed.filter(|(pair, _)| !is_inside(pair));
         self.all.extend(flew.map(|([sensor, visitor], time)| Event::Passed { sensor, visitor, time }));
     }
 
-    /// The sensors, each with the colliders that overlap it, ascending.
+    /// Pairs of a sensor and a collider that overlaps it, sorted.
     pub fn inside(&self) -> &[Touch] {
         &self.inside.now
     }
 
-    /// Whether a hit of two colliders is not over.
+    /// Whether a hit of two colliders is not complete.
     pub fn waits_for(&self, [a, b]: Touch) -> bool {
         self.unfinished.binary_search_by_key(&(a, b), |met| (met.hit.a, met.hit.b)).is_ok()
     }
 
-    /// Notes the hits of a step, in any order. Those of one pair are one. A contact stops bodies a little before their surfaces meet, and the
-    /// rest of the approach a substep later: where that is in the next step, the hit waits for it.
+    /// Records the hits of a step, in any order, and merges the hits of one pair. A contact stops bodies a little
+    /// before their surfaces meet, and the next substep stops the rest of the approach. If that substep is in the next
+    /// step, the hit waits for it.
     pub fn note_hits(&mut self, met: Vec<Met>) {
         self.met = met;
         self.met.append(&mut self.unfinished);
-        // Of one pair the fastest stands first, and the order of equal ones does not follow from where their rows are.
+        // Sort the fastest hit of a pair first. The order of equal hits must not depend on the places of their rows.
         let pair = |met: &Met| (met.hit.a, met.hit.b);
         let point = |met: &Met| met.hit.point.to_array().map(f32::to_bits);
         self.met.sort_unstable_by(|x, y| {

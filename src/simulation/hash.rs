@@ -1,24 +1,26 @@
-//! One number for the state of all bodies.
+//! A hash of the state of all bodies.
 
 use super::Simulation;
 use crate::world::{Bodies, Body};
 
-/// Basis and prime of FNV-1a with 64 bits.
+/// Basis and prime of 64-bit FNV-1a.
 const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
 impl Simulation {
-    /// A hash of the poses and velocities of all bodies: two runs have the same one where they have the same bits.
+    /// A hash of the poses and velocities of all bodies. Two runs with the same bits have the same hash.
     ///
-    /// It is FNV-1a with 64 bits over these bytes, the least of each number first: body by body in the order of their indices, vacancies left
-    /// out, the index and the generation of its handle (32 bits each), then position, rotation (x y z w), linear and angular velocity in
-    /// single precision. -0 is not 0, and a number that is none counts by its bits. The definition stays.
+    /// It is the 64-bit FNV-1a hash of the following bytes, each number little-endian. For each body in the order of
+    /// indices, without vacancies: the index and the generation of its handle (32 bits each), then position, rotation
+    /// (x y z w), linear and angular velocity in single precision. -0 differs from 0, and a NaN counts by its bits. The
+    /// definition will not change.
     pub fn hash(&self) -> u64 {
         numbers_of(&self.world.bodies).fold(BASIS, add)
     }
 }
 
-/// The hash of all bodies, and a byte for each in the order of their indices: the least of the same hash of that body alone.
+/// The hash of all bodies, and one byte for each body in the order of indices: the lowest byte of the same hash of that
+/// body alone.
 pub(crate) fn hashes(bodies: &Bodies) -> (u64, Vec<u8>) {
     let mut of_all = BASIS;
     let of_each = numbers_of(bodies).map(|numbers| {
@@ -42,7 +44,7 @@ fn numbers_of(bodies: &Bodies) -> impl Iterator<Item = [u32; 15]> {
     })
 }
 
-/// The hash with the bytes of some numbers added.
+/// Adds the bytes of some numbers to the hash.
 fn add(hash: u64, numbers: [u32; 15]) -> u64 {
     let bytes = numbers.into_iter().flat_map(u32::to_le_bytes);
     bytes.fold(hash, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))

@@ -1,11 +1,11 @@
-//! The manifolds of a step for callers to read, with impulses in world axes.
+//! The manifolds of a step for callers, with impulses in world axes.
 
 use glam::Vec3;
 
 use crate::collide::{Detector, MAX_POINTS, Manifold, NO_SLOT, Pair};
 use crate::problem::{ContactRows, ImpulseRow, StepProblem};
 
-/// The contact of two bodies over one pair of convex parts, as the last step left it.
+/// The contact of two bodies over one pair of convex parts, after the last step.
 ///
 /// ```
 /// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, SolvedManifold, World, glam::Vec3};
@@ -30,24 +30,24 @@ pub struct SolvedManifold {
     pub body_b: usize,
     /// Unit normal from a to b, world axes.
     pub normal: Vec3,
-    /// Its color among those of its kind; none if it found none and is swept alone.
+    /// The color of the contact among those of its kind, or `None` if it has no color and is solved alone.
     pub color: Option<u8>,
-    /// How far the springs of the contact are compressed while the surfaces just touch (m).
+    /// Compression of the contact springs when the surfaces just touch (m).
     pub preload: f32,
-    /// Impulse of the twist about the normal, with friction per manifold (N m s).
+    /// Torsional impulse about the normal, with friction per manifold (N m s).
     pub twist_impulse: f32,
     /// Friction impulse on b in the last substep, with friction per manifold, world axes (N s).
     pub friction_impulse: Vec3,
-    /// Impulse on b of the whole step, normal and friction of all points, world axes (N s); none where the simulation does not
-    /// [`listen`](crate::Simulation::listen).
+    /// Impulse on b over the whole step: normal and friction of all points, in world axes (N s). It is `None` if the
+    /// simulation does not [`listen`](crate::Simulation::listen).
     pub summed: Option<Vec3>,
-    /// Substeps that the step had: an impulse over the length of one is a force.
+    /// Substeps of the step. Divide an impulse of one substep by the length of the substep for a force.
     pub substeps: u32,
     points: [SolvedPoint; MAX_POINTS],
     count: usize,
 }
 
-/// One contact point, as the last step left it.
+/// One contact point, after the last step.
 ///
 /// ```
 /// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, SolvedPoint, World, glam::Vec3};
@@ -68,17 +68,17 @@ pub struct SolvedPoint {
     pub anchor_a: Vec3,
     /// On the surface of b, in b's frame (m).
     pub anchor_b: Vec3,
-    /// From the center of mass of a to the point midway between the surfaces, world axes (m).
+    /// From the center of mass of a to the point midway between the surfaces, in world axes (m).
     pub r_a: Vec3,
     /// From the center of mass of b to that point (m).
     pub r_b: Vec3,
-    /// Distance along the normal when the step began, negative when overlapping (m).
+    /// Distance along the normal at the start of the step, negative for overlap (m).
     pub separation: f32,
     /// Normal impulse on b in the last substep (N s).
     pub normal_impulse: f32,
-    /// Friction impulse on b in the last substep, world axes (N s).
+    /// Friction impulse on b in the last substep, in world axes (N s).
     pub friction_impulse: Vec3,
-    /// Impulses of the whole step; none where the simulation does not [`listen`](crate::Simulation::listen).
+    /// Impulses of the whole step, or `None` if the simulation does not [`listen`](crate::Simulation::listen).
     pub summed: Option<Summed>,
 }
 
@@ -106,7 +106,7 @@ pub struct Summed {
 }
 
 impl SolvedManifold {
-    /// Its points, 1 to 4.
+    /// The contact points, 1 to 4.
     pub fn points(&self) -> &[SolvedPoint] {
         &self.points[..self.count]
     }
@@ -159,7 +159,7 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
         }
         summed = Some(problem.total_impulse(contact));
     }
-    // With friction per manifold the row after the points is the patch's.
+    // With friction per manifold, the row after the points belongs to the patch.
     let patch = if problem.has_patches() { problem.impulses[first + count] } else { ImpulseRow::default() };
     SolvedManifold {
         substeps: (1.0 / contact.substep_share) as u32,

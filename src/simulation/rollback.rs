@@ -1,13 +1,14 @@
-//! The last states of a simulation, to go back to.
+//! The last states of a simulation, for rollback.
 
 use std::collections::VecDeque;
 
 use super::{Simulation, Snapshot};
 use crate::error::{Result, input};
 
-/// The last states of a simulation, at most so many: a game goes back to the step that another player's input belongs to, and steps again.
+/// Keeps the last states of a simulation, up to a fixed number. A networked game restores the state to which late input
+/// of another player belongs, and steps again.
 ///
-/// Memory is taken in the first lap only, as long as no more bodies and contacts come.
+/// After every place was used once, it allocates memory only if the number of bodies or contacts grows.
 ///
 /// ```
 /// use drystone::{Body, Reference, Rollback, Shape, Simulation, SolverConfig, World, glam::Vec3};
@@ -33,20 +34,20 @@ use crate::error::{Result, input};
 /// ```
 pub struct Rollback {
     capacity: usize,
-    /// The last one is the latest.
+    /// The last entry is the latest state.
     states: VecDeque<Snapshot>,
-    /// Memory of states that are forgotten.
+    /// Memory of discarded states, for reuse.
     spare: Vec<Snapshot>,
 }
 
 impl Rollback {
-    /// Room for so many states, at least one.
+    /// Room for `capacity` states, at least one.
     pub fn new(capacity: usize) -> Self {
         let capacity = capacity.max(1);
         Self { capacity, states: VecDeque::with_capacity(capacity), spare: Vec::with_capacity(capacity) }
     }
 
-    /// Most states that it keeps.
+    /// The largest number of states.
     ///
     /// ```
     /// let rollback = drystone::Rollback::new(8);
@@ -56,17 +57,17 @@ impl Rollback {
         self.capacity
     }
 
-    /// Number of states, and so of steps to go back at most.
+    /// Number of states. It is also the largest number of steps to go back.
     pub fn len(&self) -> usize {
         self.states.len()
     }
 
-    /// Whether it has no state.
+    /// Whether no state is kept.
     pub fn is_empty(&self) -> bool {
         self.states.is_empty()
     }
 
-    /// Keeps the state of now, before a step. Where there is no more room, the oldest state goes.
+    /// Keeps the present state. Call it before a step. If there is no more room, the oldest state is discarded.
     pub fn push(&mut self, simulation: &Simulation) {
         let is_full = self.states.len() == self.capacity;
         let memory = if is_full { self.states.pop_front() } else { self.spare.pop() };
@@ -80,14 +81,15 @@ impl Rollback {
         self.states.push_back(state);
     }
 
-    /// Goes back to the state that was pushed `steps` pushes ago, and forgets it and those that were pushed since: whoever steps again pushes
-    /// again. 0 steps change nothing.
+    /// Restores the state from `steps` pushes ago, and discards it together with all later states: push again for each
+    /// repeated step. 0 steps change nothing.
     ///
     /// # Errors
-    /// There are not so many states; nothing is changed then.
+    /// There are fewer states than `steps`. Nothing is changed then.
     pub fn back(&mut self, steps: usize, simulation: &mut Simulation) -> Result<()> {
         let all = self.states.len();
-        let kept = all.checked_sub(steps).ok_or_else(|| input!("{steps} steps back: {all} states are there"))?;
+        let kept =
+            all.checked_sub(steps).ok_or_else(|| input!("cannot go back {steps} steps: only {all} states are kept"))?;
         if let Some(state) = self.states.get(kept) {
             simulation.restore(state);
         }

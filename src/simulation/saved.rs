@@ -1,4 +1,4 @@
-//! Runs that fork, go back, and go into bytes.
+//! Snapshots, forks and saved runs.
 
 use super::{Simulation, Stages, next_state};
 use crate::backend::Backend;
@@ -46,13 +46,14 @@ impl Snapshot {
 
 /// The first bytes of a saved run.
 const MAGIC: [u8; 8] = *b"drystone";
-/// The version of the bytes that follow them. It grows with every change of what is saved.
+/// The format version. It grows with every change of the format.
 const VERSION: u32 = 4;
-/// Bytes before the content: the magic, the version, and the hash of the content.
+/// Size of the header (bytes): the magic, the version, and the hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 
 impl Simulation {
-    /// A second simulation that goes on from here, with a backend of its own: to the same bits, as long as both are told the same.
+    /// A second simulation that continues from this state on its own backend. Both reach the same bits if both get the
+    /// same calls.
     ///
     /// ```
     /// use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
@@ -78,7 +79,7 @@ impl Simulation {
         Self::between_steps(world, config, *stages, backend)
     }
 
-    /// The state between two steps, to go back to.
+    /// A snapshot of the state between two steps.
     ///
     /// ```
     /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
@@ -98,15 +99,15 @@ impl Simulation {
         Snapshot { world: world.clone(), config: config.clone(), stages: Box::new(stages.clone()) }
     }
 
-    /// The same, in place of another state, with its memory.
+    /// The same, but reuses the memory of another snapshot.
     pub fn snapshot_into(&self, snapshot: &mut Snapshot) {
         snapshot.world.clone_from(&self.world);
         snapshot.config.clone_from(&self.config);
         (*snapshot.stages).clone_from(&self.stages);
     }
 
-    /// Goes back to a state, of this simulation or of another: the world, the settings, and all that the next step goes on from. The
-    /// backend stays.
+    /// Restores a snapshot of this simulation or of another one: the world, the settings, and all solver state for the
+    /// next step. The backend stays.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         self.world.clone_from(&snapshot.world);
         self.config.clone_from(&snapshot.config);
@@ -117,12 +118,12 @@ impl Simulation {
         self.state = next_state();
     }
 
-    /// The state between two steps as bytes, for [`Simulation::load`]: the same on every machine. They begin with a version and a hash of
-    /// what follows, which finds damage; it does not find what someone forged, who knows how it is made.
+    /// The state between two steps as bytes, for [`Simulation::load`]. The bytes are the same on every machine. They
+    /// begin with a version and a hash of the content. The hash detects damage, but not a deliberate forgery.
     ///
-    /// A run that goes on from them has the bits of one that was not interrupted. Until its first step,
-    /// [`Simulation::problem`] and [`Simulation::plan`] of it lack what each step writes anew, and [`Simulation::manifolds`] says how far points
-    /// were apart when their manifolds were computed.
+    /// A loaded run has the same bits as an uninterrupted run. Before its first step, [`Simulation::problem`] and
+    /// [`Simulation::plan`] lack the parts that each step rewrites, and [`Simulation::manifolds`] gives the separations
+    /// from the time when the manifolds were computed.
     pub fn save(&mut self) -> Vec<u8> {
         let mut writer = Writer::default();
         writer.bytes.extend_from_slice(&[0; HEADER]);
@@ -136,10 +137,11 @@ impl Simulation {
         bytes
     }
 
-    /// The simulation that was saved, with a backend of its own.
+    /// Loads a saved simulation, with its own backend.
     ///
     /// # Errors
-    /// The bytes are none of a saved run, of another version, damaged or cut short. Of bytes that someone forged the first steps may fail.
+    /// The bytes are not a saved run, have another version, or are damaged or cut short. If the bytes are forged, the
+    /// first steps can fail.
     ///
     /// ```
     /// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
@@ -155,13 +157,14 @@ impl Simulation {
     /// ```
     pub fn load(bytes: &[u8], backend: Box<dyn Backend>) -> Result<Self> {
         let (header, content) = bytes.split_first_chunk::<HEADER>().ok_or_else(|| refused("cut short"))?;
-        ensure(header[..8] == MAGIC, || refused("these bytes are none").to_string())?;
+        ensure(header[..8] == MAGIC, || refused("these bytes are not a saved run").to_string())?;
         let number =
             |from: usize, to: usize| header[from..to].iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
         let version = number(8, 12);
-        let other = || refused(format_args!("it has version {version}, and this program reads {VERSION}")).to_string();
+        let other =
+            || refused(format_args!("it has version {version}, but this program reads version {VERSION}")).to_string();
         ensure(version == u64::from(VERSION), other)?;
-        let damaged = || refused("damaged or cut short: the hash of its content is another").to_string();
+        let damaged = || refused("it is damaged or cut short: the hash of its content differs").to_string();
         ensure(number(12, HEADER) == hash_of(content), damaged)?;
         let (world, config) = (World::blank(), SolverConfig::default());
         let stages = Stages::new(&world, &config);
@@ -169,11 +172,11 @@ impl Simulation {
         let mut reader = Reader::new(content);
         let read = panics::caught(|| simulation.walk(&mut reader));
         read.map_err(|panic| refused(format_args!("damaged: {}", panic.text)))?.map_err(refused)?;
-        ensure(reader.is_at_end(), || refused("it goes on behind its end").to_string())?;
+        ensure(reader.is_at_end(), || refused("it has bytes after its end").to_string())?;
         Ok(simulation)
     }
 
-    /// The world and the settings as bytes, to be compared.
+    /// The world and the settings as bytes, for comparison.
     pub(super) fn world_and_settings(&mut self) -> Vec<u8> {
         let mut writer = Writer::default();
         let written = self.world.walk(&mut writer).and_then(|()| self.config.walk(&mut writer));

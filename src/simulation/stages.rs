@@ -1,4 +1,5 @@
-//! All state that lasts from step to step, except the copy of a device, and the stages of a step before and after the backend.
+//! All state that lasts from step to step, except the copy on a device. It has the stages of a step before and after
+//! the backend.
 
 use rayon::prelude::*;
 
@@ -17,7 +18,7 @@ use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
 use crate::world::{Body, BodyKind, MassProperties, Material, World};
 
-/// Everything that a step leaves to the next one, but for what a device keeps.
+/// Everything that a step passes to the next one, except the data on a device.
 pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
@@ -31,16 +32,18 @@ pub(super) struct Stages {
     pub problem: StepProblem,
     pub plan: StepPlan,
     pub events: Events,
-    /// The contacts of each body, where somebody listens.
+    /// The contacts of each body, if a caller listens.
     pub by_body: ByBody,
-    /// The key of the plan; none if the next step has to make a plan.
+    /// The key of the plan, or `None` if the next step has to build a plan.
     plan_key: Option<PlanKey>,
-    /// Points of the contacts that take part, and bytes that the plan moves.
+    /// Number of active contact points, and bytes that the plan moves.
     points: usize,
     bytes_moved: u64,
-    /// Bodies that the last step itself left out of range, ascending: they touch nothing, and do not stop the next step.
+    /// Bodies that the last step moved out of range, in ascending order. They touch nothing, and do not make the next
+    /// step fail.
     pub astray: Vec<usize>,
-    /// Whether rows came from bytes that were loaded, whose hash anyone can make, and did not all take part in a step since.
+    /// Whether some rows still come from loaded bytes and were not part of a step since. Anyone can compute the hash of
+    /// forged bytes.
     pub is_foreign: bool,
 }
 
@@ -64,13 +67,12 @@ crate::saved::cloned!(Stages {
     is_foreign,
 });
 
-/// The settings and the properties of bodies that all rows were written for. A change of this value, and nothing else, brings all state
-/// along.
+/// The settings and body properties for which all rows were written. Only a change of this value updates the state.
 struct Key {
     config: SolverConfig,
-    /// Body by body.
+    /// One entry for each body.
     surfaces: Vec<(MassProperties, Material)>,
-    /// Scale of impulses and preloads; none before the first step.
+    /// Scale of impulses and preloads, or `None` before the first step.
     scale: Option<StepScale>,
 }
 
@@ -91,16 +93,16 @@ impl Saved for Key {
     }
 }
 
-/// The changes of the caller since the last step that concern state between steps.
+/// The caller's changes since the last step that affect the state between steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Changes {
-    /// Bodies that came, went, or changed kind, groups or shapes, ascending.
+    /// Bodies that were added or removed, or that changed kind, groups or shapes, in ascending order.
     bodies: Vec<usize>,
     settings: bool,
-    /// Masses or materials.
+    /// Whether masses or materials changed.
     surfaces: bool,
     joints: bool,
-    /// The length of a substep or the stiffness of contacts.
+    /// Whether the length of a substep or the stiffness of contacts changed.
     step: bool,
 }
 
@@ -110,7 +112,7 @@ impl Changes {
         self.surfaces || !self.bodies.is_empty()
     }
 
-    /// Whether the number of bodies or all rows of contacts change with it, so that a device cannot go on from those that it has.
+    /// Whether the number of bodies or all rows of contacts change, so that a device cannot continue from its own rows.
     pub fn all_rows(&self) -> bool {
         self.settings || self.step || self.surfaces()
     }
@@ -140,8 +142,8 @@ impl Stages {
         }
     }
 
-    /// Writes all that lasts, or reads it: for the bodies of `world`. The plan of the step before is not part of it: without one, the next step
-    /// makes its own.
+    /// Writes or reads all lasting state for the bodies of `world`. The plan is not part of it: without one, the next
+    /// step builds its own.
     pub fn walk<A: Archive>(&mut self, world: &World, archive: &mut A) -> Result<()> {
         let Self {
             detector,
@@ -187,10 +189,10 @@ impl Stages {
         })
     }
 
-    /// The changes of the caller since the last step.
+    /// The caller's changes since the last step.
     ///
     /// # Errors
-    /// A body, a joint or a mass is not fit to be simulated.
+    /// A body, a joint or a mass cannot be simulated.
     pub fn changes(&self, world: &World, config: &SolverConfig, dt: f32) -> Result<Changes> {
         let is_astray = |i: usize| self.astray.binary_search(&i).is_ok();
         let fits = |i: usize, body: &Body| body.check_motion().is_ok() || is_astray(i);
@@ -216,7 +218,7 @@ impl Stages {
         self.key.config.substeps
     }
 
-    /// Brings all that lasts to what the caller changed.
+    /// Updates all lasting state to the caller's changes.
     pub fn follow(&mut self, world: &World, config: &SolverConfig, dt: f32, changes: &Changes) {
         if !changes.bodies.is_empty() {
             self.follow_bodies(world, &changes.bodies);
@@ -255,7 +257,7 @@ impl Stages {
         }
     }
 
-    /// Takes over bodies that came, went, or changed kind, groups or shapes.
+    /// Applies bodies that were added or removed, or that changed kind, groups or shapes.
     fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         self.sleep.follow_bodies(world, changed);
         self.detector.follow_bodies(world, changed);
@@ -269,27 +271,27 @@ impl Stages {
         self.plan_key = None;
     }
 
-    /// Wakes what was changed; whether there is nothing to do in this step.
+    /// Wakes changed bodies. Returns whether the step has nothing to do.
     pub fn is_everything_still(&mut self, world: &World, stats: &mut StepStats) -> bool {
         timed(&mut stats.times.detect, || self.sleep.before_step(world, &self.detector));
         stats.asleep = self.sleep.count();
         self.sleep.is_everything_still()
     }
 
-    /// Detects, colors and chooses the effort of each island. True if the rows of a device no longer fit: an island has another class,
-    /// or a body lies where it touched nothing before.
+    /// Detects contacts, colors them, and chooses the substep level of each island. Returns true if the rows on a
+    /// device no longer fit: an island has another level, or a body rests where it touched nothing before.
     pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
         let Self { detector, sleep, effort, energy, contacts, joints, problem, found, by_body, .. } = self;
-        // Rows may change their places; a step that fails makes no new lists.
+        // Rows can change places. A step that fails makes no new lists.
         by_body.forget();
         let times = &mut stats.times;
-        // Decided before the detection, by what a device that has the rows was asked to leave for.
+        // Decided before the detection, like the decision whether to fetch the rows from a device.
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
         *found = timed(&mut times.detect, || {
             detector.end_teleported(world);
             let mut found = detector.detect(world, config, dt, sleep.activity());
             contacts.follow(world, detector);
-            // A body that wakes takes part in this step already.
+            // A body that wakes takes part in this step.
             while sleep.wake_touched(world, detector) {
                 let before = found;
                 found = detector.detect(world, config, dt, sleep.activity());
@@ -320,13 +322,13 @@ impl Stages {
         })
     }
 
-    /// Prepares and plans. `on_device`: the device goes on from its own rows.
+    /// Prepares and plans the step. With `on_device`, the device continues from its own rows.
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
         let Self { detector, sleep, effort, contacts, joints, problem, found, events, .. } = self;
         timed(&mut stats.times.prepare, || {
             problem::begin(world, sleep.asleep(), config, effort, problem);
             contacts.carry.on_device = on_device;
-            // The work of a body that moves by itself follows from the impulses of the whole step.
+            // The work of a driven body follows from the impulses of the whole step.
             let drives = |body: &Body| body.kind != BodyKind::Dynamic && body.is_driven();
             contacts.sums = events.listen.sums() || world.bodies.iter().any(drives);
             contacts.write(world, detector, config, effort, dt, problem);
@@ -356,7 +358,7 @@ impl Stages {
         stats.bytes_moved = self.bytes_moved;
     }
 
-    /// Notes what the step did that ran; `world` is as the step found it.
+    /// Records the events of the step that ran. `world` is the world before the step.
     fn note_events(&mut self, world: &World, dt: f32) {
         let Self { contacts, problem, events, by_body, key, .. } = self;
         let side = |side| collider_of(world, side);
@@ -383,7 +385,7 @@ impl Stages {
         }
     }
 
-    /// Takes the joints out that bore more in the step than they can.
+    /// Removes the joints that carried more than their break force in the step.
     fn break_joints(&mut self, world: &mut World, dt: f32) {
         let first = self.events.all.len();
         for (i, joint) in world.joints.iter().enumerate().filter(|(_, joint)| joint.can_break()) {
@@ -399,14 +401,14 @@ impl Stages {
         }
     }
 
-    /// Brings poses and velocities to the world, without the energy that constraints made.
+    /// Stores poses and velocities in the world, and removes energy that constraints added.
     pub fn store(&mut self, world: &mut World, dt: f32) -> Taken {
         self.note_events(world, dt);
         let Self { energy, effort, key, problem, .. } = self;
         let taken = energy.hold(world, problem, effort, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
         let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());
-        // Where joints stand is where they were within the step: what their springs held at its end is not there.
+        // The joints are measured within the step. They do not hold the energy of their springs at its end.
         self.energy.follow_bodies(world, &stopped);
         self.detector.note_left(world);
         self.astray = bodies_astray(world);
@@ -422,14 +424,14 @@ impl Stages {
     }
 }
 
-/// The bodies whose pose, velocity or loads are out of range, ascending.
+/// The bodies whose pose, velocity or loads are out of range, in ascending order.
 fn bodies_astray(world: &World) -> Vec<usize> {
     let is_astray = |i: &usize| world.bodies[*i].check_motion().is_err();
     let all = (0..world.bodies.len()).into_par_iter().with_min_len(1024);
     if all.clone().any(|i| is_astray(&i)) { all.filter(is_astray).collect() } else { Vec::new() }
 }
 
-/// A collider, by the index of its body and its own among those of its body.
+/// A collider, by the index of its body and its index on that body.
 pub(super) fn collider_of(world: &World, (body, collider): (u32, u32)) -> ColliderOf {
     let body = world.bodies.handle(body as usize).expect("a collider has its body");
     ColliderOf { body, collider: collider as usize }

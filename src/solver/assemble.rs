@@ -1,4 +1,4 @@
-//! From a contact problem to the rows that the kernels sweep, in f64 and rounded.
+//! Converts a contact problem to the rows that the kernels sweep, in f64 and rounded to f32.
 
 use glam::{DMat3, DVec3};
 
@@ -10,26 +10,26 @@ use crate::math::{Vec3, vec3};
 use crate::problem::arithmetic::tangent_mass;
 use crate::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, StepProblem, Substep};
 
-/// A contact problem as a step without time.
+/// A contact problem as a step without duration.
 pub(super) struct Assembled {
-    /// Rounded, with all indices.
+    /// The rounded rows, with all indices.
     pub problem: StepProblem,
-    /// The same in all digits.
+    /// The same rows in full precision.
     pub rows: KernelRows<f64>,
-    /// Which point, and so which impulse, belongs to each contact.
+    /// The point, and so the impulse, of each contact.
     pub points: Vec<u32>,
     /// 1, or -1 for a contact whose second tangent is the opposite of the one that the kernels form.
     pub hands: Vec<f64>,
 }
 
-/// A substep of one second in which nothing moves: offsets are separations then, each wanted to close exactly in it.
+/// A substep of one second without motion. Offsets then act as separations that the substep closes exactly.
 const HARD: Softness = Softness { bias_rate: 1.0, mass_scale: 1.0, impulse_scale: 0.0, push_limit: f32::MAX };
 
 impl Assembled {
-    /// Lays a problem out in an order.
+    /// Lays out a problem in an order.
     ///
     /// # Errors
-    /// A contact whose second tangent is not, up to its sign, the normal times the first.
+    /// The second tangent of a contact is not the normal times the first, up to sign.
     pub fn new(contacts: &ContactProblem, order: Order) -> Result<Self> {
         let operator = Operator::new(contacts);
         let sequence = Sequence::new(order, contacts);
@@ -44,12 +44,12 @@ impl Assembled {
         };
         rows.params = vec![StepParams::load(&problem.params, &substep)];
 
-        // Bodies, and what is fixed as one more that nothing moves.
+        // The bodies, and one more for everything fixed, which no impulse moves.
         rows.bodies = contacts.bodies.iter().map(|b| body(b.free)).chain([body(Velocity::default())]).collect();
         rows.masses = (0..contacts.bodies.len()).map(|i| mass(&operator, i)).chain([Mass::default()]).collect();
         let row_of = |body: Option<u32>| body.unwrap_or(contacts.bodies.len() as u32);
 
-        // Manifolds in the order of the sweep, one after another.
+        // Manifolds one after another, in the order of the sweep.
         let mut points = vec![0; contacts.contacts.len()];
         for manifold in &sequence.manifolds {
             let first = &contacts.contacts[manifold[0] as usize];
@@ -85,7 +85,7 @@ impl Assembled {
     }
 }
 
-/// Whether the frame of a contact is right-handed, as those of the kernels are.
+/// The sign of a frame: right-handed frames are those of the kernels.
 fn hand(index: usize, contact: &PointContact) -> Result<f64> {
     let [n, t_1, t_2] = contact.frame;
     let formed = n.cross(t_1);

@@ -1,13 +1,15 @@
-//! A contact problem swept from zero impulses, on any backend or in f64: the kernels of a step over a step without time.
+//! Solves a contact problem by sweeps from zero impulses, on any backend or in f64. It uses the kernels of a step on a
+//! step without duration.
 //!
-//! A sweep visits one manifold after another and corrects its normal impulses, then its friction, each clamped to what
-//! Coulomb's cone allows (docs/derivation.md, sections 4 and 6). The accelerated method adds momentum to them
+//! A sweep visits one manifold after another. It corrects the normal impulses, then friction, and clamps both to
+//! Coulomb's cone (docs/derivation.md, sections 4 and 6). The accelerated method adds momentum
 //! ([`crate::kernels::momentum`]).
 //!
-//! Velocities that sweeps carry along drift away from those of the impulses, by rounding: in f32 by some 3e-8 of the free
-//! velocities a sweep, more with momentum. So they are set right, in f64, after every 64 plain sweeps and wherever momentum
-//! ended. Errors e_vel that f32 comes to without that and with it, accelerated, after 1000 sweeps: Spheres-i099 4e-5 and
-//! 2e-7, KaplaTower-135 4e-5 and 1e-7, mj_wall 2e-3 and 6e-5, tower10 5e-4 and 1e-4.
+//! Sweeps update velocities together with impulses, and rounding makes the two drift apart: in f32 by about 3e-8 of the
+//! free velocities per sweep, and by more with momentum. Therefore velocities are recomputed from the impulses in f64
+//! after every 64 plain sweeps and after each end of momentum. Errors e_vel in f32 without and with this correction,
+//! after 1000 accelerated sweeps: Spheres-i099 4e-5 and 2e-7, KaplaTower-135 4e-5 and 1e-7, mj_wall 2e-3 and 6e-5,
+//! tower10 5e-4 and 1e-4.
 
 mod assemble;
 pub mod newton;
@@ -30,13 +32,13 @@ use crate::plan::StepPlan;
 use crate::problem::StepProblem;
 use assemble::Assembled;
 
-/// Plain sweeps after which velocities are set right.
+/// Number of plain sweeps between two corrections of the velocities.
 const DRIFT_SWEEPS: u32 = 64;
 
-/// Sweeps after which momentum begins anew: it multiplies rounding by as much as it is old.
+/// Number of sweeps after which momentum restarts: it multiplies rounding errors by its age.
 const LONGEST_MOMENTUM: u32 = 1024;
 
-/// A contact problem while it is solved.
+/// The solver state of a contact problem.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -66,27 +68,27 @@ pub struct Solver<'a> {
     method: Method,
     passes: u8,
     problem: StepProblem,
-    /// Which impulse belongs to each contact, and the sign of its second tangent.
+    /// The impulse of each contact, and the sign of its second tangent.
     points: Vec<u32>,
     hands: Vec<f64>,
     sweeps: u32,
-    /// Sweeps since momentum was begun, or velocities set right.
+    /// Sweeps since the last start of momentum, or since the last correction of the velocities.
     since: u32,
 }
 
 /// The backend of the sweeps.
 enum Work {
-    /// In f64, over rows that are kept.
+    /// In f64, on rows that the solver owns.
     Exact(Box<Reference<f64>>),
     /// In f32.
     Rounded(Box<dyn Backend>),
 }
 
 impl<'a> Solver<'a> {
-    /// From zero impulses in f64, or in f32 on a backend.
+    /// A solver with zero impulses, in f64 or in f32 on a backend.
     ///
     /// # Errors
-    /// A contact whose second tangent is not, up to its sign, the normal times the first.
+    /// The second tangent of a contact is not the normal times the first, up to sign.
     pub fn new(
         contacts: &'a ContactProblem,
         method: Method,
@@ -111,12 +113,12 @@ impl<'a> Solver<'a> {
         })
     }
 
-    /// The same with every manifold swept so many times before the next, and not as often as its order proposes.
+    /// Sweeps every manifold `passes` times before the next one, instead of the number that its order proposes.
     pub fn with_passes(self, passes: u8) -> Self {
         Self { passes, ..self }
     }
 
-    /// Colors that the order of the contacts forms.
+    /// Number of colors in the order of the contacts.
     pub fn colors(&self) -> usize {
         self.problem.contact_colors().len()
     }
@@ -129,14 +131,14 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Some sweeps, with what the method does besides.
+    /// Runs sweeps, with the other work of the method.
     ///
     /// # Errors
     /// The problem does not fit the device, or the device is lost.
     pub fn advance(&mut self, sweeps: u32) -> Result<()> {
         let end = self.sweeps + sweeps;
         while self.sweeps < end {
-            // Momentum may end with any sweep.
+            // Momentum can end after any sweep.
             let count = match self.method {
                 Method::Plain => (end - self.sweeps).min(DRIFT_SWEEPS - self.since),
                 Method::Accelerated => 1,
@@ -149,7 +151,7 @@ impl<'a> Solver<'a> {
                 Work::Exact(reference) => reference.advance(&self.problem, &plan.passes),
                 Work::Rounded(backend) => backend.run_checked(CheckedStep::built(&mut self.problem, &plan.passes))?,
             }
-            // Right after a restart nothing depends on the velocities of the sweep before. Begun anew, it is one, too.
+            // Right after a restart, the result does not depend on the velocities of the sweep before: it is a new start, too.
             let is_new = self.since == if self.method == Method::Plain { DRIFT_SWEEPS } else { LONGEST_MOMENTUM };
             if is_new {
                 self.since = 0;
@@ -161,7 +163,7 @@ impl<'a> Solver<'a> {
         Ok(())
     }
 
-    /// The impulses of the last sweep in the order of the problem, each in its contact's coordinates (N s).
+    /// The impulses after the last sweep in the order of the problem, each in its contact's coordinates (N s).
     pub fn impulses(&self) -> Vec<DVec3> {
         let impulse = |(&point, &hand): (&u32, &f64)| {
             let impulse = match &self.work {
@@ -173,7 +175,7 @@ impl<'a> Solver<'a> {
         self.points.iter().zip(&self.hands).map(impulse).collect()
     }
 
-    /// The velocities of the last sweep, carried along with the impulses.
+    /// The velocities after the last sweep, updated together with the impulses.
     pub fn velocities(&self) -> Vec<Velocity> {
         let velocity = |i: usize| {
             let body = match &self.work {
@@ -192,7 +194,7 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Gives every body the velocity that belongs to the impulses.
+    /// Recomputes the velocity of every body from the impulses.
     fn set_right(&mut self) {
         let right = self.operator.velocities(&self.impulses()).into_iter().map(assemble::body);
         match &mut self.work {

@@ -1,4 +1,4 @@
-//! Ground truth: a contact problem solved as far as f64 goes.
+//! Reference solutions of contact problems, as accurate as f64 allows.
 
 use glam::DVec3;
 
@@ -28,18 +28,18 @@ use crate::residuals::{Measure, Residuals};
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Solution {
-    /// Impulses of the contacts, each in its coordinates (N s). Often not the only ones that solve the problem.
+    /// Impulses of the contacts, each in its coordinates (N s). They are often not unique.
     pub impulses: Vec<DVec3>,
-    /// The velocities that they give the bodies.
+    /// The velocities of the bodies under these impulses.
     pub velocities: Vec<Velocity>,
     /// Their errors.
     pub residuals: Residuals,
-    /// Sweeps that it took.
+    /// Number of sweeps.
     pub sweeps: u32,
 }
 
-/// Solves a problem in f64 by accelerated sweeps, contact by contact, until `e_vel` is at most `tolerance` or `most` sweeps
-/// are done; the best of them is the result, and its residuals say how good that is.
+/// Solves a problem in f64 by accelerated sweeps, contact by contact, until `e_vel` is at most `tolerance` or after
+/// `most` sweeps. The result is the best iterate, and its residuals give its accuracy.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -56,7 +56,7 @@ pub struct Solution {
 /// ```
 ///
 /// # Errors
-/// A contact whose second tangent is not, up to its sign, the normal times the first.
+/// The second tangent of a contact is not the normal times the first, up to sign.
 pub fn solution(problem: &ContactProblem, tolerance: f64, most: u32) -> Result<Solution> {
     let measure = Measure::new(problem);
     let mut solver = Solver::new(problem, Method::Accelerated, Order::Contacts, None)?;

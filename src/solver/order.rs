@@ -1,4 +1,4 @@
-//! In which order a sweep goes over the contacts of a problem.
+//! The order in which a sweep visits the contacts of a problem.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use crate::contacts::{ContactProblem, PointContact};
 use crate::graph::{ConstraintGraph, Edge, IMMOVABLE};
 use crate::names::named;
 
-/// In which order a sweep goes over contacts. It is a part of the method: another order takes other numbers of sweeps.
+/// The order in which a sweep visits contacts. It is part of the method: another order needs another number of sweeps.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -26,10 +26,10 @@ use crate::names::named;
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Order {
-    /// Every contact by itself: in the order of the file each takes the first color that is free on both of its bodies.
+    /// Every contact by itself. In file order, each contact takes the first color that is free on both of its bodies.
     Contacts,
-    /// Contacts of the same two bodies with one frame together, up to four, as in a step: manifolds are colored, those with
-    /// something fixed come last.
+    /// Contacts of the same two bodies with the same frame form a manifold of up to four, as in a step. Manifolds are
+    /// colored, and those with a fixed body come last.
     #[default]
     Manifolds,
 }
@@ -37,8 +37,8 @@ pub enum Order {
 named!(Order { Contacts = "contacts", Manifolds = "manifolds", });
 
 impl Order {
-    /// How often a manifold is swept before the next one: twice, since its points depend on each other most (numbers in
-    /// docs/convergence.md). Single contacts are swept once.
+    /// Number of passes over a manifold before the next one: two, because its points are strongly coupled (numbers in
+    /// docs/convergence.md). Single contacts get one pass.
     pub fn passes(self) -> u8 {
         match self {
             Self::Contacts => 1,
@@ -67,12 +67,12 @@ impl Order {
 pub struct Sequence {
     /// Indices of the contacts of each manifold, 1 to 4, color by color.
     pub manifolds: Vec<Vec<u32>>,
-    /// Where each color begins among them, and where the last ends.
+    /// The index of the first manifold of each color, and the end of the last color.
     pub offsets: Vec<u32>,
 }
 
 impl Sequence {
-    /// Of the contacts of a problem.
+    /// The sequence of the contacts of a problem.
     pub fn new(order: Order, problem: &ContactProblem) -> Self {
         match order {
             Order::Contacts => by_contact(problem),
@@ -135,5 +135,5 @@ fn is_same_surface(a: &PointContact, b: &PointContact) -> bool {
     a.friction == b.friction && apart(0) <= SAME_FRAME && apart(1) <= SAME_FRAME
 }
 
-/// Frames nearer than this are one frame: the difference is rounding.
+/// Frames with a smaller difference count as equal: the difference is rounding.
 const SAME_FRAME: f64 = 1e-12;

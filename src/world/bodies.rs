@@ -1,4 +1,4 @@
-//! The bodies of a world, which come and go.
+//! The bodies of a world. Bodies can be inserted and removed at any time.
 
 use std::fmt;
 use std::ops::{Deref, Index, IndexMut};
@@ -11,17 +11,16 @@ use super::tag::WorldTag;
 use crate::error::{Result, ensure, input};
 use crate::saved::{Archive, Columns, Saved};
 
-/// Names one body for as long as the body is in its world. The handle of a body that was removed names nothing from then on: the next body
-/// at the same index has another handle.
+/// Identifies one body for as long as the body is in its world. After the body is removed, its handle names nothing:
+/// the next body at the same index gets another handle.
 ///
-/// A world refuses the handles of a world that was made apart from it ([`World::new`](super::World::new)). Clones, forks and snapshots of a
-/// world take each other's handles. A world that was loaded, or whose bodies were collected from an iterator, has no identity: it takes any
-/// handle, and any world takes the handles that it gives. Handles compare by index and generation alone, so that handles of two
-/// worlds may be equal.
+/// A world refuses handles of an unrelated world ([`World::new`](super::World::new)). A world, its clones, its forks
+/// and its snapshots accept each other's handles. A world that was loaded, or collected from an iterator of bodies, has
+/// no identity: it accepts any handle, and any world accepts its handles. Handles compare by index and generation
+/// alone, so handles of two worlds can be equal.
 ///
-/// An index becomes the handle of the *first* body at that index, which is the body that [`World::add`](super::World::add) counted
-/// where none was removed
-/// before.
+/// An index converts to the handle of the *first* body at that index. [`World::add`](super::World::add) returns the
+/// index of that body as long as no body was removed before.
 ///
 /// ```
 /// use drystone::{Body, BodyHandle, World};
@@ -30,7 +29,7 @@ use crate::saved::{Archive, Columns, Saved};
 /// let handle: BodyHandle = world.insert(Body::fixed());
 /// assert_eq!(handle.index(), 0);
 /// world.remove(handle);
-/// // Another body takes the index, and not the handle.
+/// // Another body gets the index, but not the handle.
 /// let other = world.insert(Body::fixed());
 /// assert!(other.index() == 0 && other != handle);
 /// ```
@@ -43,7 +42,7 @@ pub struct BodyHandle {
 
 crate::saved::fields!(BodyHandle { index, generation } scratch { tag });
 
-/// Without its world, whose number is another one in each process.
+/// Leaves the world tag out: its number differs in each process.
 impl fmt::Debug for BodyHandle {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { index, generation, tag: _ } = self;
@@ -51,7 +50,7 @@ impl fmt::Debug for BodyHandle {
     }
 }
 
-/// The first body at an index, of any world.
+/// The first body at an index, in any world.
 impl From<usize> for BodyHandle {
     fn from(index: usize) -> Self {
         Self { index: u32::try_from(index).unwrap_or(u32::MAX), generation: 0, tag: WorldTag::default() }
@@ -59,7 +58,8 @@ impl From<usize> for BodyHandle {
 }
 
 impl BodyHandle {
-    /// Whether both name the same body of the same world, as far as that is known.
+    /// Whether both handles name the same body of the same world. Tags can only tell worlds apart if both worlds have
+    /// one.
     pub(crate) fn is(self, other: Self) -> bool {
         self == other && self.tag.fits(other.tag)
     }
@@ -70,11 +70,13 @@ impl BodyHandle {
     }
 }
 
-/// The bodies of a world, or of several beside each other: a slice in which a body keeps its index until the body is removed.
+/// The bodies of one world, or of several worlds that share this list. It acts as a slice in which a body keeps its
+/// index until it is removed.
 ///
-/// A removed body leaves a vacancy, a fixed body without shapes, which the next body of the same world fills. Indices depend on the
-/// order of the calls alone. Bodies can be changed one by one, and not sorted or swapped as a slice: handles would then name other bodies.
-/// [`World::check`](super::World::check) and the next step refuse a body that was written to a vacancy.
+/// A removed body leaves a vacancy: a fixed body without shapes. The next body of the same world fills it. Indices
+/// depend only on the order of the calls. Bodies can be changed one by one, but must not be sorted or swapped as a
+/// slice: handles would then name other bodies. [`World::check`](super::World::check) and the next step refuse a body
+/// that was written to a vacancy.
 ///
 /// ```
 /// use drystone::{Body, World, world::Bodies};
@@ -103,18 +105,18 @@ impl BodyHandle {
 #[derive(Debug, Default)]
 pub struct Bodies {
     all: Vec<Body>,
-    /// Of each index; even while a body is there, odd while it is vacant.
+    /// Generation of each index: even while a body is there, odd while the index is vacant.
     generations: Vec<u32>,
     /// The world of each index.
     worlds: Vec<u32>,
-    /// Vacant indices, world by world; the last of them is filled first.
+    /// Vacant indices of each world. The last one is filled first.
     pub(super) vacant: Vec<Vec<u32>>,
     tag: WorldTag,
 }
 
 crate::saved::cloned!(Bodies { all, generations, worlds, vacant, tag });
 
-/// The columns of poses and velocities: where bodies are, two of rotations, whether they move, and how.
+/// Column indices in a saved file: position, two for the rotation, whether the body moves, and its velocities.
 const PLACE: usize = 0;
 const ROTATION: usize = 3;
 const MOVES: usize = 5;
@@ -174,7 +176,7 @@ impl Motion {
         Self { place: body.position, rotation: body.rotation, velocities }
     }
 
-    /// Writes or reads it, near that of the body before.
+    /// Writes or reads it as a difference from the body before.
     fn walk(&mut self, last: &Self, columns: &mut Columns) -> Result<()> {
         let Self { place, rotation, velocities } = self;
         for k in 0..3 {
@@ -193,12 +195,12 @@ impl Motion {
 }
 
 impl Bodies {
-    /// None yet, of a world with this tag.
+    /// No bodies yet, for a world with this tag.
     pub(super) fn of_world(tag: WorldTag) -> Self {
         Self { tag, ..Self::default() }
     }
 
-    /// Puts a body into one of the worlds, or into the world after the last.
+    /// Inserts a body into an existing world, or into a new one after the last.
     pub(super) fn insert(&mut self, world: usize, body: Body) -> BodyHandle {
         if self.vacant.len() <= world {
             self.vacant.resize(world + 1, Vec::new());
@@ -215,7 +217,7 @@ impl Bodies {
         BodyHandle { index, generation: *generation, tag: self.tag }
     }
 
-    /// Takes a body out; none if it is gone.
+    /// Removes a body. Returns `None` if it is already gone.
     pub(super) fn remove(&mut self, handle: BodyHandle) -> Option<Body> {
         if !self.contains(handle) {
             return None;
@@ -226,7 +228,7 @@ impl Bodies {
         Some(std::mem::replace(&mut self.all[index], Body::fixed()))
     }
 
-    /// Sets other bodies beside these, in worlds of their own. Vacancies are set with them.
+    /// Appends the bodies and vacancies of another list as worlds of their own.
     pub(super) fn append(&mut self, other: &Self) {
         let (first, world) = (self.all.len() as u32, self.world_count() as u32);
         self.vacant.resize(world as usize, Vec::new());
@@ -237,24 +239,25 @@ impl Bodies {
         self.vacant.extend(vacant.map(|own| own.iter().map(|index| first + index).collect::<Vec<_>>()));
     }
 
-    /// Makes room for so many indices, or fewer.
+    /// Grows or shrinks the list to `count` indices.
     pub(super) fn resize(&mut self, count: usize) {
         self.all.resize(count, Body::fixed());
         self.generations.resize(count, 0);
         self.worlds.resize(count, 0);
     }
 
-    /// Says which generation of an index its body is, and of which world.
+    /// Sets the generation and the world of the body at an index.
     pub(super) fn set_place(&mut self, index: usize, generation: u32, world: u32) {
         (self.generations[index], self.worlds[index]) = (generation, world);
     }
 
-    /// Whether the body is there.
+    /// Whether the handle names a body that is still in this world.
     pub fn contains(&self, handle: BodyHandle) -> bool {
         self.generations.get(handle.index()) == Some(&handle.generation) && handle.tag.fits(self.tag)
     }
 
-    /// The handle here of a body of `other`, whose bodies were appended behind the first so many; of none where it names none there.
+    /// Converts a handle of `other` after `other` was appended at index `first`. The result names no body if the handle
+    /// names none in `other`.
     pub(super) fn appended(&self, body: BodyHandle, first: usize, other: &Self) -> BodyHandle {
         let generation = if other.contains(body) { body.generation } else { u32::MAX };
         BodyHandle { index: body.index.saturating_add(first as u32), generation, tag: self.tag }
@@ -271,37 +274,37 @@ impl Bodies {
             None => input!("names body {index}, beyond the last of {count}"),
             Some(_) if self.is_vacant(index) => input!("names body {index}, which is gone"),
             Some(other) => input!(
-                "names body {index}, which is gone: {:?} has its index (an index names the first body there, a handle any)",
+                "names body {index}, which is gone: {:?} has its index now (an index names only the first body there; use a handle)",
                 other.name
             ),
         })
     }
 
-    /// Refuses a body where none is.
+    /// Refuses a body that was written to a vacancy.
     pub(super) fn check_place(&self, index: usize) -> Result<()> {
         let body = &self.all[index];
         let is_empty = body.kind == BodyKind::Fixed && body.colliders.is_empty();
         ensure(is_empty || !self.is_vacant(index), || {
-            "written to an index that is vacant: World::insert puts a body there".into()
+            "written to a vacant index: use World::insert to add a body".into()
         })
     }
 
-    /// A body by its index, to be changed; none beyond the last.
+    /// A mutable body by its index. Returns `None` beyond the last index.
     pub fn get_mut(&mut self, index: usize) -> Option<&mut Body> {
         self.all.get_mut(index)
     }
 
-    /// All bodies and vacancies, to be changed.
+    /// All bodies and vacancies, mutable.
     pub fn iter_mut(&mut self) -> slice::IterMut<'_, Body> {
         self.all.iter_mut()
     }
 
-    /// The same, for several threads.
+    /// The same as a slice, to split among threads.
     pub(crate) fn as_mut_slice(&mut self) -> &mut [Body] {
         &mut self.all
     }
 
-    /// The handle of the body at an index; none if there is none.
+    /// The handle of the body at an index. Returns `None` if the index is vacant or beyond the last.
     pub fn handle(&self, index: usize) -> Option<BodyHandle> {
         let generation = self.generations.get(index).copied().filter(|generation| generation % 2 == 0)?;
         Some(BodyHandle { index: index as u32, generation, tag: self.tag })
@@ -312,7 +315,7 @@ impl Bodies {
         (0..self.all.len()).filter_map(|index| self.handle(index))
     }
 
-    /// Number of bodies, vacancies not counted.
+    /// Number of bodies, without vacancies.
     pub fn count(&self) -> usize {
         self.all.len() - self.vacant.iter().map(Vec::len).sum::<usize>()
     }
@@ -332,7 +335,7 @@ impl Bodies {
         &self.worlds
     }
 
-    /// Whether all indices are there that name one.
+    /// Whether every index that a body, a vacancy or a world names exists.
     pub(crate) fn are_consistent(&self) -> bool {
         let Self { all, generations, worlds, vacant, tag: _ } = self;
         let is_vacant = |&i: &u32| generations.get(i as usize).is_some_and(|generation| generation % 2 == 1);
@@ -343,7 +346,7 @@ impl Bodies {
             && vacant.iter().flatten().all(is_vacant)
     }
 
-    /// The generation of each index, which changes with every body that comes or goes there.
+    /// The generation of each index. It changes whenever a body is inserted or removed there.
     pub(crate) fn generations(&self) -> &[u32] {
         &self.generations
     }

@@ -39,7 +39,7 @@ crate::saved::kinds!(BodyKind { Fixed, Kinematic, Dynamic });
 
 /// Friction and restitution of a surface.
 ///
-/// Two materials combine: friction by the geometric mean, sqrt(a b); restitution by the larger.
+/// A contact combines two materials: friction by the geometric mean, sqrt(a b), and restitution by the larger value.
 ///
 /// ```
 /// use drystone::Material;
@@ -70,7 +70,7 @@ impl Material {
     }
 }
 
-/// A shape at a place on a body.
+/// A shape with a pose on a body.
 ///
 /// ```
 /// use drystone::{Body, Shape, glam::{Quat, Vec3}, world::Collider};
@@ -91,14 +91,15 @@ pub struct Collider {
     pub position: Vec3,
     /// Rotation in the body's frame.
     pub rotation: Quat,
-    /// Whether it is a sensor: it meets other colliders without touching them, and has no mass. See [`Body::sensor`].
+    /// Whether the shape is a sensor. A sensor detects other colliders, pushes none of them, and has no mass. See
+    /// [`Body::sensor`].
     pub sensor: bool,
 }
 
 crate::saved::fields!(Collider { shape, position, rotation, sensor });
 
 impl Collider {
-    /// Refuses a shape or a place that cannot be simulated on any body.
+    /// Refuses a shape or a pose that no body can have.
     pub(crate) fn check(&self) -> Result<()> {
         self.shape.check()?;
         check_place("position", self.position)?;
@@ -106,7 +107,8 @@ impl Collider {
     }
 }
 
-/// A rigid body. Build one with [`Body::fixed`], [`Body::kinematic`] or [`Body::dynamic`] and the methods that follow.
+/// A rigid body. Build one with [`Body::fixed`], [`Body::kinematic`] or [`Body::dynamic`] and the builder methods
+/// below.
 ///
 /// ```
 /// use drystone::{Body, Shape};
@@ -139,7 +141,7 @@ impl Collider {
 /// ball.apply_angular_impulse(Vec3::Z * -0.2);
 /// assert!(ball.angular_velocity.length() < 1e-5);
 ///
-/// // A kinematic body goes where it is told, and a sensor beside it sees what comes.
+/// // A kinematic body moves as the caller sets it, and a sensor next to it detects other bodies.
 /// let mut lift = Body::kinematic().shape(Shape::cuboid(1.0, 0.1, 1.0));
 /// lift = lift.sensor_at(Shape::cuboid(1.0, 0.5, 1.0), Vec3::Y * 0.6, Quat::IDENTITY);
 /// lift.move_to(Vec3::Y * 0.5, Quat::IDENTITY, 0.25);
@@ -148,9 +150,9 @@ impl Collider {
 /// ```
 #[derive(Debug)]
 pub struct Body {
-    /// Name for people; empty if none was given.
+    /// Name for messages and reports; empty by default.
     pub name: String,
-    /// How it moves.
+    /// How the body moves.
     pub kind: BodyKind,
     /// Origin of the body's frame in the world (m).
     pub position: Vec3,
@@ -160,26 +162,28 @@ pub struct Body {
     pub linear_velocity: Vec3,
     /// Angular velocity in world axes (rad/s).
     pub angular_velocity: Vec3,
-    /// Force through the center of mass, besides gravity, constant until changed (N).
+    /// Force through the center of mass, in addition to gravity (N). It acts until it is changed.
     pub force: Vec3,
-    /// Torque in world axes, constant until changed (N m).
+    /// Torque in world axes (N m). It acts until it is changed.
     pub torque: Vec3,
-    /// The share of its world's gravity that the body feels: 1 unless set, 0 floats, -1 rises as fast as others fall. Of dynamic bodies.
+    /// Scales the gravity of the world for this body: 1 by default, 0 floats, -1 rises as fast as other bodies fall.
+    /// Only dynamic bodies feel gravity.
     pub gravity_scale: f32,
-    /// Mass, center of mass and inertia; zero unless dynamic. They do not follow [`Self::colliders`] or [`Self::kind`] where
-    /// those are changed later: [`Self::update_mass`] makes them anew. A simulation raises moments of inertia that are
-    /// less than a 32nd of the mass times the square of the lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
+    /// Mass, center of mass and inertia; zero unless the body is dynamic. A later change of [`Self::colliders`] or
+    /// [`Self::kind`] does not change them: call [`Self::update_mass`]. A simulation raises a moment of inertia that is
+    /// less than 1/32 of the mass times the squared lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
     pub mass: MassProperties,
-    /// Surface.
+    /// Friction and restitution of the surface.
     pub material: Material,
-    /// Which bodies it meets.
+    /// Which bodies this body collides with.
     pub groups: Groups,
-    /// Whether it is a bullet: see [`Body::swept`](Body::swept()).
+    /// Whether the body is a bullet: see [`Body::swept`](Body::swept()).
     pub swept: bool,
-    /// Shapes on the body; several make a compound. The mass does not follow a change of them: call [`Self::update_mass`].
+    /// Shapes on the body; several make a compound. The mass does not follow a change of them: call
+    /// [`Self::update_mass`].
     pub colliders: Vec<Collider>,
     weight: Weight,
-    /// Force and torque of the next step alone.
+    /// Force and torque for the next step only.
     pub(super) applied_force: Vec3,
     pub(super) applied_torque: Vec3,
 }
@@ -204,14 +208,14 @@ crate::saved::cloned!(Body {
     applied_torque,
 });
 
-/// The source of the mass of a body.
+/// Where the mass of a body comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Weight {
-    /// The shapes at a density (kg/m³).
+    /// From the shapes, at this density (kg/m³).
     Density(f32),
-    /// The shapes at a total mass (kg).
+    /// From the shapes, scaled to this total mass (kg).
     Total(f32),
-    /// The caller, whatever the shapes are.
+    /// From the caller, for any shapes.
     Given,
 }
 
@@ -253,7 +257,7 @@ impl Saved for Body {
 }
 
 impl Body {
-    /// Writes what most bodies share, or reads it: all but pose and velocity.
+    /// Writes or reads every field except pose and velocity. Most bodies share these values.
     pub(super) fn walk_rest<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         let Self {
             name,
@@ -316,18 +320,18 @@ impl Body {
         Self::new(BodyKind::Fixed)
     }
 
-    /// A body that moves with the velocity that the caller gives it.
+    /// A body that moves with the velocity that the caller sets.
     pub fn kinematic() -> Self {
         Self::new(BodyKind::Kinematic)
     }
 
-    /// A body that moves by forces and impulses; its density is 1000 kg/m³ unless set.
+    /// A body that moves by forces and impulses. Its density is 1000 kg/m³ by default.
     pub fn dynamic() -> Self {
         Self::new(BodyKind::Dynamic)
     }
 
-    /// Adds a shape at the body's origin, and its mass. This and the following methods may be called in any order; of [`Self::density`],
-    /// [`Self::total_mass`] and [`Self::mass_properties`] the last one counts.
+    /// Adds a shape at the body's origin, and its mass. The builder methods can be called in any order. Of
+    /// [`Self::density`], [`Self::total_mass`] and [`Self::mass_properties`], the last call wins.
     ///
     /// ```
     /// use drystone::{Body, Shape};
@@ -339,21 +343,22 @@ impl Body {
         self.shape_at(shape, Vec3::ZERO, Quat::IDENTITY)
     }
 
-    /// Adds a shape at a place in the body's frame.
+    /// Adds a shape at a pose in the body's frame.
     pub fn shape_at(mut self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
         self.colliders.push(Collider { shape, position, rotation, sensor: false });
         self.update_mass();
         self
     }
 
-    /// Adds a sensor at the body's origin: a shape without mass that bodies pass through, and that tells which colliders overlap it
-    /// ([`Event::Entered`](crate::Event::Entered), [`Event::Left`](crate::Event::Left)) and what flew through it within a step
-    /// ([`Event::Passed`](crate::Event::Passed)).
+    /// Adds a sensor at the body's origin. A sensor is a shape without mass, and bodies pass through it. It reports the
+    /// colliders that overlap it ([`Event::Entered`](crate::Event::Entered), [`Event::Left`](crate::Event::Left)) and
+    /// the colliders that flew through it within one step ([`Event::Passed`](crate::Event::Passed)).
     ///
-    /// A sensor sees colliders of other bodies which the [`groups`](Body::groups) of its body meet, but no sensors. One of the two bodies has
-    /// to be dynamic or kinematic: a fixed sensor does not see the ground, and one on a body that moves does. Bodies that a joint keeps from
-    /// colliding do not see each other. A sensor wakes nobody, and sees bodies that sleep. Meshes and height fields have no inside: they
-    /// overlap what meets their surfaces.
+    /// A sensor detects the colliders of other bodies if the [`groups`](Body::groups) of the two bodies match. It does
+    /// not detect other sensors. At least one of the two bodies has to be dynamic or kinematic: a fixed sensor does not
+    /// detect the ground, but a sensor on a moving body does. A sensor does not detect a body if a joint keeps the two
+    /// bodies from colliding. A sensor wakes no body, and it detects sleeping bodies. Meshes and height fields have no
+    /// inside: they overlap only shapes that cross their surface.
     ///
     /// ```
     /// use drystone::{Body, Event, Reference, Shape, Simulation, SolverConfig, World};
@@ -375,23 +380,24 @@ impl Body {
         self.sensor_at(shape, Vec3::ZERO, Quat::IDENTITY)
     }
 
-    /// Adds a sensor at a place in the body's frame.
+    /// Adds a sensor at a pose in the body's frame.
     pub fn sensor_at(mut self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
         self.colliders.push(Collider { shape, position, rotation, sensor: true });
         self
     }
 
-    /// Its shapes that are no sensors.
+    /// The colliders that are not sensors.
     pub(crate) fn solids(&self) -> impl Iterator<Item = &Collider> + Clone {
         self.colliders.iter().filter(|c| !c.sensor)
     }
 
-    /// Mass from density (kg/m³), above 0.
+    /// Sets the density (kg/m³), above 0. The mass follows from the shapes.
     pub fn density(self, density: f32) -> Self {
         self.weighing(Weight::Density(density))
     }
 
-    /// Total mass (kg), within [`MassProperties::MASSES`]; inertia of the shapes, scaled to it.
+    /// Sets the total mass (kg), within [`MassProperties::MASSES`]. The inertia is that of the shapes, scaled to this
+    /// mass.
     pub fn total_mass(self, mass: f32) -> Self {
         self.weighing(Weight::Total(mass))
     }
@@ -402,7 +408,7 @@ impl Body {
         self
     }
 
-    /// Mass, center and inertia as given, instead of those of the shapes.
+    /// Sets mass, center of mass and inertia, in place of the values from the shapes.
     ///
     /// ```
     /// use drystone::{Body, MassProperties, Shape, glam::Vec3};
@@ -417,52 +423,53 @@ impl Body {
         self.weighing(Weight::Given)
     }
 
-    /// Origin of the body's frame (m).
+    /// Sets the position of the body's origin (m).
     pub fn position(mut self, x: f32, y: f32, z: f32) -> Self {
         self.position = Vec3::new(x, y, z);
         self
     }
 
-    /// Rotation of the body's frame.
+    /// Sets the rotation of the body's frame.
     pub fn rotation(mut self, rotation: Quat) -> Self {
         self.rotation = rotation;
         self
     }
 
-    /// Velocity of the center of mass (m/s) and angular velocity (rad/s).
+    /// Sets the velocity of the center of mass (m/s) and the angular velocity (rad/s).
     pub fn velocity(mut self, linear: Vec3, angular: Vec3) -> Self {
         self.linear_velocity = linear;
         self.angular_velocity = angular;
         self
     }
 
-    /// The share of its world's gravity that it feels.
+    /// Sets the factor on the world's gravity for this body.
     pub fn gravity_scale(mut self, scale: f32) -> Self {
         self.gravity_scale = scale;
         self
     }
 
-    /// Coulomb coefficient.
+    /// Sets the Coulomb friction coefficient, 0 or more.
     pub fn friction(mut self, friction: f32) -> Self {
         self.material.friction = friction;
         self
     }
 
-    /// Ratio of separation to approach velocity.
+    /// Sets the ratio of separation to approach velocity, 0 to 1.
     pub fn restitution(mut self, restitution: f32) -> Self {
         self.material.restitution = restitution;
         self
     }
 
-    /// Which bodies it meets.
+    /// Sets which bodies this body collides with.
     pub fn groups(mut self, groups: Groups) -> Self {
         self.groups = groups;
         self
     }
 
-    /// Marks a bullet. Without the mark, nothing passes through fixed geometry, and contacts between bodies that move act along the ways that both would
-    /// take through the step if nothing touched them. Where one is thrown onto another way within the step, by a bounce or a push, the two may pass
-    /// through each other. A body with the mark is held where the way that it took passes through what moves.
+    /// Marks the body as a bullet. Even without the mark, no body passes through fixed geometry, and contacts between
+    /// two moving bodies act along the paths that both would take through the step without contact. But a bounce or a
+    /// push can put a body on another path within the step, and two such bodies can pass through each other. A bullet
+    /// stops where its actual path crosses a moving body.
     ///
     /// ```
     /// use drystone::{Body, Shape};
@@ -475,15 +482,15 @@ impl Body {
         self
     }
 
-    /// Name for people.
+    /// Sets the name for messages and reports.
     pub fn named(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
         self
     }
 
-    /// Makes mass, center and inertia anew from the shapes as they are now, by the density or the total mass that was given: for
-    /// a body whose [`colliders`](Self::colliders) or [`kind`](Self::kind) were changed. It does nothing where
-    /// [`Self::mass_properties`] gave them, and to bodies that are not dynamic.
+    /// Recomputes mass, center of mass and inertia from the present shapes, at the density or total mass that was set.
+    /// Call it after a change of [`colliders`](Self::colliders) or [`kind`](Self::kind). It has no effect if
+    /// [`Self::mass_properties`] set the mass, or if the body is not dynamic.
     ///
     /// ```
     /// use drystone::{Body, Shape};
@@ -507,7 +514,7 @@ impl Body {
         };
     }
 
-    /// Refuses a mass that no dynamic body can have, by what it follows from.
+    /// Refuses a mass that no dynamic body can have. The message names the source of the mass.
     fn check_mass(&self) -> Result<()> {
         self.mass.check().map_err(|error| match self.weight {
             Weight::Given => error,
@@ -525,7 +532,7 @@ impl Body {
         })
     }
 
-    /// Whether another body differs from this one in nothing but pose, velocity, forces and torques.
+    /// Whether another body is equal except for pose, velocity, forces and torques.
     pub(super) fn is_same_but_for_motion(&self, other: &Self) -> bool {
         let Self {
             name,
@@ -551,7 +558,7 @@ impl Body {
             && self.has_same_colliders(other)
     }
 
-    /// Whether another body has the same shapes, not only equal ones, at the same places.
+    /// Whether another body shares the same shapes at the same poses. Equal copies of a shape do not count.
     pub(super) fn has_same_colliders(&self, other: &Self) -> bool {
         let same = |(a, b): (&Collider, &Collider)| {
             let Collider { shape, position, rotation, sensor } = a;
@@ -560,22 +567,22 @@ impl Body {
         self.colliders.len() == other.colliders.len() && self.colliders.iter().zip(&other.colliders).all(same)
     }
 
-    /// Whether it is kinematic and moves.
+    /// Whether the body is kinematic and moves.
     pub fn is_driven(&self) -> bool {
         self.kind == BodyKind::Kinematic && (self.linear_velocity != Vec3::ZERO || self.angular_velocity != Vec3::ZERO)
     }
 
-    /// Radius around its origin that holds its shapes that are no sensors (m); 0 without.
+    /// Radius of a sphere around the body's origin that holds all shapes except sensors (m); 0 without shapes.
     pub(crate) fn reach(&self) -> f32 {
         self.solids().map(|c| c.position.length() + c.shape.bounding_radius()).fold(0.0, f32::max)
     }
 
-    /// Half of the smallest side of the thinnest of its shapes that are no sensors (m); infinite without.
+    /// Half of the smallest side of the thinnest shape that is not a sensor (m); infinite without shapes.
     pub fn smallest_half_extent(&self) -> f32 {
         self.solids().map(|c| c.shape.smallest_half_extent()).fold(f32::INFINITY, f32::min)
     }
 
-    /// Centre of mass in the world (m).
+    /// Center of mass in the world (m).
     pub fn center_of_mass(&self) -> Vec3 {
         self.position + self.rotation * self.mass.center
     }
@@ -585,8 +592,8 @@ impl Body {
         self.linear_velocity + self.angular_velocity.cross(p - self.center_of_mass())
     }
 
-    /// Changes the velocity at once, as a hit through the center of mass does (N s). Nothing unless the body is dynamic; this and the following five
-    /// wake a body that sleeps, with all that it touches.
+    /// Changes the velocity at once, like a hit through the center of mass (N s). It has no effect unless the body is
+    /// dynamic. This method and the five below wake a sleeping body and every body that it touches.
     ///
     /// ```
     /// use drystone::{Body, Shape, glam::Vec3};
@@ -603,21 +610,21 @@ impl Body {
         }
     }
 
-    /// Changes velocity and angular velocity at once, as a hit (N s) at a point of the world (m) does.
+    /// Changes linear and angular velocity at once, like a hit (N s) at a point of the world (m).
     pub fn apply_impulse_at(&mut self, impulse: Vec3, point: Vec3) {
         self.apply_impulse(impulse);
         self.apply_angular_impulse((point - self.center_of_mass()).cross(impulse));
     }
 
-    /// Changes the angular velocity at once; an angular impulse in world axes (N m s).
+    /// Changes the angular velocity at once, by an angular impulse in world axes (N m s).
     pub fn apply_angular_impulse(&mut self, impulse: Vec3) {
         if self.kind == BodyKind::Dynamic {
             self.angular_velocity += self.mass.world_inverse_inertia(self.rotation) * impulse;
         }
     }
 
-    /// A force through the center of mass during the next step (N), besides [`Body::force`] and what was applied before. The step that acts by it
-    /// forgets it; one that fails does not.
+    /// Adds a force through the center of mass for the next step (N), in addition to [`Body::force`] and earlier calls.
+    /// The next successful step uses it up; a step that fails keeps it.
     ///
     /// ```
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
@@ -636,41 +643,42 @@ impl Body {
         }
     }
 
-    /// A force (N) at a point of the world (m) during the next step: [`Body::apply_force`] and the torque about the center of mass as it is now.
+    /// Adds a force (N) at a point of the world (m) for the next step: [`Body::apply_force`] plus the torque about the
+    /// present center of mass.
     pub fn apply_force_at(&mut self, force: Vec3, point: Vec3) {
         self.apply_force(force);
         self.apply_torque((point - self.center_of_mass()).cross(force));
     }
 
-    /// A torque in world axes during the next step (N m), besides [`Body::torque`] and what was applied before.
+    /// Adds a torque in world axes for the next step (N m), in addition to [`Body::torque`] and earlier calls.
     pub fn apply_torque(&mut self, torque: Vec3) {
         if self.kind == BodyKind::Dynamic {
             self.applied_torque += torque;
         }
     }
 
-    /// Force that acts in the next step, besides gravity (N).
+    /// Total force that acts in the next step, without gravity (N).
     pub fn whole_force(&self) -> Vec3 {
         self.force + self.applied_force
     }
 
-    /// Torque that acts in the next step, world axes (N m).
+    /// Total torque that acts in the next step, in world axes (N m).
     pub fn whole_torque(&self) -> Vec3 {
         self.torque + self.applied_torque
     }
 
-    /// Forgets forces and torques of one step.
+    /// Clears the forces and torques that act for one step only.
     pub(crate) fn forget_applied_forces(&mut self) {
         (self.applied_force, self.applied_torque) = (Vec3::ZERO, Vec3::ZERO);
     }
 
-    /// Gives a kinematic body the velocity that takes it to a pose within `dt` seconds, more than 0. The next step refuses one
-    /// that is out of range.
+    /// Gives a kinematic body the velocity that takes it to a pose within `dt` seconds, above 0. The next step refuses
+    /// a velocity that is out of range.
     pub fn move_to(&mut self, position: Vec3, rotation: Quat, dt: f32) {
         let center = position + rotation * self.mass.center;
         self.linear_velocity = (center - self.center_of_mass()) / dt;
         let turn = rotation::product(rotation, self.rotation.inverse());
-        // The shorter way round.
+        // Take the shorter way around.
         let turn = if turn.w < 0.0 { -turn } else { turn };
         self.angular_velocity = rotation::vector_of(rotation::unit(turn)) / dt;
     }
@@ -703,7 +711,7 @@ impl Body {
         self.check_surface()
     }
 
-    /// Refuses a pose, a velocity, a force, a torque or a share of gravity out of range.
+    /// Refuses a pose, velocity, force, torque or gravity scale that is out of range.
     pub(crate) fn check_motion(&self) -> Result<()> {
         check_place("position", self.position)?;
         check_rotation("rotation", self.rotation)?;
@@ -715,7 +723,7 @@ impl Body {
         let accelerations = if loads != [Vec3::ZERO; 2] && self.kind == BodyKind::Dynamic && self.mass.mass > 0.0 {
             [loads[0] / self.mass.mass, self.mass.world_inverse_inertia(self.rotation) * loads[1]]
         } else {
-            // Nothing where a load is a number.
+            // The product is zero if the load is finite.
             loads.map(|load| 0.0 * load)
         };
         for ((name, load), acceleration) in ["force", "torque"].into_iter().zip(loads).zip(accelerations) {
@@ -733,7 +741,7 @@ impl Body {
         let check = |c: &Collider| {
             c.check()?;
             let fits = (self.kind != BodyKind::Kinematic && !c.sensor) || !c.shape.is_half_space();
-            ensure(fits, || "half-spaces are for fixed bodies, and no sensors".into())?;
+            ensure(fits, || "half-spaces are for fixed bodies only, and cannot be sensors".into())?;
             let fits = self.kind != BodyKind::Dynamic || c.sensor || c.shape.has_volume();
             ensure(fits, || "half-spaces, meshes and height fields have no mass: not for dynamic bodies".into())
         };

@@ -1,45 +1,46 @@
-//! What a caller changed of a world between two steps, as a value.
+//! The difference between two states of a world, as a value. It records the changes that a caller made between two
+//! steps.
 
 use glam::{Quat, Vec3};
 
 use super::{Body, Collider, Joints, World};
 
-/// The changes that make one world another one.
+/// The changes that turn one world into another.
 #[derive(Default)]
 pub(crate) struct WorldChange {
     gravity: Option<(Vec3, Vec<Option<Vec3>>)>,
-    /// The number of indices and the vacant ones, if a body came or went.
+    /// The number of indices and the vacant ones, if a body was added or removed.
     places: Option<(u32, Vec<Vec<u32>>)>,
-    /// Bodies that came, went, or differ in more than their motion.
+    /// Bodies that were added or removed, or that differ in more than their motion.
     bodies: Vec<BodyChange>,
-    /// Bodies that differ in their motion alone, by index.
+    /// Bodies that differ only in their motion, by index.
     motions: Vec<(u32, Motion)>,
     joints: Option<Joints>,
 }
 
 crate::saved::fields!(WorldChange { gravity, places, bodies, motions, joints });
 
-/// A body that is another one, or none.
+/// A replaced, added or removed body.
 struct BodyChange {
     index: u32,
     generation: u32,
     world: u32,
     /// The body without its colliders.
     body: Body,
-    /// The colliders; none if they are those that stand there.
+    /// The colliders, or `None` if they are the same as before.
     colliders: Option<Vec<Collider>>,
 }
 
 crate::saved::fields!(BodyChange { index, generation, world, body, colliders });
 
-/// What a caller changes most of the time.
+/// The fields that callers change most often.
 #[derive(Clone, Copy)]
 struct Motion {
     position: Vec3,
     rotation: Quat,
     linear_velocity: Vec3,
     angular_velocity: Vec3,
-    /// The lasting force and torque, and those of the next step alone.
+    /// The lasting force and torque, then the force and torque for the next step only.
     loads: [Vec3; 4],
 }
 
@@ -101,7 +102,8 @@ impl WorldChange {
         change
     }
 
-    /// Makes the changes. Indices beyond the last body are left out: a change is of the world that it was made from.
+    /// Applies the changes. It skips indices beyond the last body: a change applies to the world that it was computed
+    /// from.
     pub fn make(&self, world: &mut World) {
         if let Some((gravity, own_gravity)) = &self.gravity {
             world.gravity = *gravity;

@@ -1,8 +1,8 @@
-//! Which bodies meet which.
+//! Collision groups: which bodies collide with which.
 
-/// The groups that a body is a member of, and those that it meets: 32 of each, one bit a group.
+/// The groups that a body belongs to, and the groups that it collides with: 32 bits each, one bit for each group.
 ///
-/// Two bodies meet where each is a member of a group that the other meets.
+/// Two bodies collide if each one belongs to a group that the other collides with.
 ///
 /// ```
 /// use drystone::Groups;
@@ -19,19 +19,19 @@
     serde(deny_unknown_fields, default)
 )]
 pub struct Groups {
-    /// The groups that it is a member of.
+    /// The groups that the body belongs to.
     pub membership: u32,
-    /// The groups that it meets.
+    /// The groups that the body collides with.
     pub filter: u32,
 }
 
 crate::saved::fields!(Groups { membership, filter });
 
 impl Groups {
-    /// A member of all groups that meets all: what a body has unless told otherwise.
+    /// Belongs to all groups and collides with all groups. This is the default.
     pub const ALL: Self = Self { membership: u32::MAX, filter: u32::MAX };
 
-    /// Whether two of these meet.
+    /// Whether two bodies with these groups collide.
     pub fn meets(self, other: Self) -> bool {
         self.membership & other.filter != 0 && other.membership & self.filter != 0
     }

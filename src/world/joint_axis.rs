@@ -1,9 +1,10 @@
-//! One axis of a joint: its limits and its drive.
+//! One axis of a joint: its bounds and its drive.
 
 use crate::error::{Result, input};
 use crate::saved::{Archive, Saved};
 
-/// One way for body a of a joint to move against body b: along an axis (m, N), or about it (rad, N m).
+/// One degree of freedom of body a against body b: a translation along an axis (m, N), or a rotation about it (rad, N
+/// m).
 ///
 /// ```
 /// use drystone::Axis;
@@ -14,13 +15,13 @@ use crate::saved::{Archive, Saved};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Axis {
-    /// Where it may be.
+    /// Which positions the axis can take.
     pub bounds: Bounds,
-    /// What drives it.
+    /// The motor or spring of the axis.
     pub drive: Drive,
 }
 
-/// Where an axis may be.
+/// Which positions an axis can take.
 ///
 /// ```
 /// use drystone::{Axis, Bounds};
@@ -30,21 +31,21 @@ pub struct Axis {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Bounds {
-    /// Anywhere.
+    /// Any position.
     #[default]
     Free,
-    /// At zero.
+    /// Only zero.
     Locked,
-    /// Between two places, which may be the same. Angles are -pi to pi: a joint does not count turns.
+    /// Any position between two limits, which can be equal. Angles range from -pi to pi: a joint does not count turns.
     Between {
-        /// The least (m, rad); for a place or a distance it may be -infinity, without a lower limit.
+        /// The lower limit (m, rad). A translation or a distance can have -infinity for no lower limit.
         min: f32,
-        /// The most (m, rad); for a place or a distance it may be infinity, without an upper limit.
+        /// The upper limit (m, rad). A translation or a distance can have infinity for no upper limit.
         max: f32,
     },
 }
 
-/// What drives an axis.
+/// The motor or spring of an axis.
 ///
 /// ```
 /// use drystone::{Axis, Drive};
@@ -55,26 +56,27 @@ pub enum Bounds {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Drive {
-    /// Nothing.
+    /// No drive.
     #[default]
     None,
     /// A motor that holds a speed.
     Motor {
         /// The speed (m/s, rad/s).
         speed: f32,
-        /// The most that it pushes or pulls (N, N m).
+        /// The largest force or torque (N, N m).
         max_load: f32,
     },
     /// A spring and damper.
     Spring {
-        /// Where it is at rest (m, rad).
+        /// The rest position (m, rad).
         target: f32,
-        /// How often a second the bodies would swing about the target without damper, turning about their centers of mass and shifting
-        /// freely (Hz). A hinge away from a center has more inertia to turn and swings slower.
+        /// Frequency at which the bodies would swing about the target without the damper, if they turned about their
+        /// centers of mass and translated freely (Hz). A hinge away from a center of mass turns more inertia and swings
+        /// slower.
         frequency: f32,
-        /// 0 without damping, 1 where it no longer swings.
+        /// Damping ratio: 0 is undamped, 1 is critically damped.
         damping_ratio: f32,
-        /// The most that spring and damper push or pull together (N, N m).
+        /// The largest total force or torque of spring and damper (N, N m).
         max_load: f32,
     },
 }
@@ -85,17 +87,19 @@ impl Axis {
     /// Held at zero.
     pub const LOCKED: Self = Self { bounds: Bounds::Locked, drive: Drive::None };
 
-    /// Free between two places: see [`Bounds::Between`].
+    /// Free between two limits: see [`Bounds::Between`].
     pub const fn limited(min: f32, max: f32) -> Self {
         Self { bounds: Bounds::Between { min, max }, drive: Drive::None }
     }
 
-    /// Driven at `speed` (m/s, rad/s) by up to `max_load` (N, N m). With a speed of 0 it is dry friction. Limits of the axis hold against any load.
+    /// Adds a motor that holds `speed` (m/s, rad/s) with up to `max_load` (N, N m). With a speed of 0 the motor acts as
+    /// dry friction. Limits of the axis hold against any load.
     pub const fn motor(self, speed: f32, max_load: f32) -> Self {
         Self { drive: Drive::Motor { speed, max_load }, ..self }
     }
 
-    /// Pulled to `target` (m, rad) by a spring and damper with up to `max_load` (N, N m). An angle is pulled the shorter way around.
+    /// Adds a spring and damper that pull to `target` (m, rad) with up to `max_load` (N, N m). A spring turns an angle
+    /// the shorter way around.
     pub const fn spring(self, target: f32, frequency: f32, damping_ratio: f32, max_load: f32) -> Self {
         Self { drive: Drive::Spring { target, frequency, damping_ratio, max_load }, ..self }
     }
@@ -103,7 +107,7 @@ impl Axis {
 
 crate::saved::fields!(Axis { bounds, drive });
 
-/// A kind, and its numbers.
+/// Writes the kind, then its numbers.
 impl Saved for Bounds {
     fn blank() -> Self {
         Self::default()
@@ -123,13 +127,13 @@ impl Saved for Bounds {
             0 => Self::Free,
             1 => Self::Locked,
             2 => Self::Between { min: numbers[0], max: numbers[1] },
-            _ => return Err(input!("bounds of kind {kind} are not known")),
+            _ => return Err(input!("unknown kind of bounds: {kind}")),
         };
         Ok(())
     }
 }
 
-/// A kind, and its numbers.
+/// Writes the kind, then its numbers.
 impl Saved for Drive {
     fn blank() -> Self {
         Self::default()
@@ -152,7 +156,7 @@ impl Saved for Drive {
             0 => Self::None,
             1 => Self::Motor { speed: a, max_load: b },
             2 => Self::Spring { target: a, frequency: b, damping_ratio: c, max_load: d },
-            _ => return Err(input!("a drive of kind {kind} is not known")),
+            _ => return Err(input!("unknown kind of drive: {kind}")),
         };
         Ok(())
     }

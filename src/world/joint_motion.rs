@@ -1,4 +1,4 @@
-//! Where the axes of a joint stand, and how fast they move.
+//! Positions and speeds along the axes of a joint.
 
 use std::f32::consts::PI;
 
@@ -11,7 +11,7 @@ use super::limits::{MOST_LENGTH, MOST_SPEED, check_rotation};
 use crate::error::{Result, ensure};
 use crate::math::rotation::{product, unit};
 
-/// Where body a of a joint is against body b, and how fast it moves there: three axes to shift along, then three to turn about.
+/// Position and speed of body a against body b along each axis of a joint: three translations, then three rotations.
 ///
 /// ```
 /// use drystone::{Body, Joint, JointMotion, Shape, World, glam::{Quat, Vec3}};
@@ -26,25 +26,26 @@ use crate::math::rotation::{product, unit};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotion {
-    /// Positions (m), then angles (rad): that about the first axis, between -pi and pi, and the two of the vector by which the first axis is
-    /// turned. The first is the distance of the anchors if the joint guides that.
+    /// Positions (m), then angles (rad). The first angle is the twist about the first axis, from -pi to pi. The other
+    /// two are the components of the rotation vector that turns the first axis. The first position is the distance of
+    /// the anchors if the joint restricts the distance.
     pub position: [f32; 6],
-    /// Their changes (m/s, rad/s).
+    /// Rates of the positions and angles (m/s, rad/s).
     pub speed: [f32; 6],
-    /// The world's direction of each axis. Along it, or about it, body a is pushed.
+    /// World direction of each axis. The joint pushes body a along it, or turns body a about it.
     pub(crate) direction: [Vec3; 6],
     /// The gap between the anchors (m).
     anchor_gap: f32,
 }
 
-/// The least of angle cot(angle): near pi the direction of the turn is lost.
+/// The smallest value of angle cot(angle). Near pi the direction of the rotation is lost.
 const MOST_TURNED: f32 = -30.0;
 
-/// Distances below this have no direction (m).
+/// A shorter distance than this has no direction (m).
 pub(crate) const LEAST_DISTANCE: f32 = 1e-6;
 
 impl World {
-    /// Where the axes of a joint stand, and how fast they move; NaN where a body of the joint is gone.
+    /// Positions and speeds along the axes of a joint. All are NaN if a body of the joint is gone.
     ///
     /// ```
     /// # use drystone::{Body, Joint, Shape, World, glam::Vec3};
@@ -80,13 +81,13 @@ impl World {
             (direction[1], direction[2], position[1], position[2]) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
         }
         position[3..].copy_from_slice(&angles(relative));
-        // The angle about the first axis grows with the spin about the middle between the axes of the two bodies.
+        // The twist grows with the spin about the bisector of the first axes of the two bodies.
         let both = 1.0 + axes_b[0].dot(first_a);
         if both > 1e-3 {
             direction[3] = (axes_b[0] + first_a) / both;
         }
-        // The other two are those of the vector of a turn by `angle` about n across e_b: a spin w changes it by w.n along n, and by
-        // angle (w.t cot(angle) + w.e_b) along t = e_b x n.
+        // The other two angles are components of a rotation by `angle` about n across e_b. A spin w changes the
+        // rotation by w.n along n, and by angle (w.t cot(angle) + w.e_b) along t = e_b x n.
         let turn = axes_b[1] * position[4] + axes_b[2] * position[5];
         let angle = turn.length();
         if angle > 1e-3 {
@@ -106,7 +107,7 @@ impl World {
 }
 
 impl JointMotion {
-    /// How far the anchors are from where the joint is to hold them (m).
+    /// Distance of the anchors from the positions that the joint allows (m).
     pub(super) fn gap(&self, joint: &Joint) -> f32 {
         if joint.holds_anchors() {
             return self.anchor_gap;
@@ -120,11 +121,11 @@ impl JointMotion {
     }
 }
 
-/// The angle of a rotation about the first axis, and the two components of the vector of the rotation that is left.
+/// The twist of a rotation about the first axis, and two components of the rotation vector that remains.
 fn angles(q: Quat) -> [f32; 3] {
     let q = if q.w < 0.0 { -q } else { q };
     let length = (q.w * q.w + q.x * q.x).sqrt();
-    // Turned by pi about an axis across the first.
+    // The length is zero for a rotation by pi about an axis across the first.
     let twist = if length > 0.0 { Quat::from_xyzw(q.x / length, 0.0, 0.0, q.w / length) } else { Quat::IDENTITY };
     let swing = product(q, twist.conjugate());
     let sine = (swing.y * swing.y + swing.z * swing.z).sqrt();
@@ -133,7 +134,7 @@ fn angles(q: Quat) -> [f32; 3] {
 }
 
 impl Joint {
-    /// Refuses frames that are no rotations, and limits and drives out of range.
+    /// Refuses frames that are not rotations, and limits and drives that are out of range.
     pub(crate) fn check_axes(&self) -> Result<()> {
         let message =
             || "its axis has no direction: hinge, slider and along take a vector with a finite length above 0".into();
@@ -147,7 +148,7 @@ impl Joint {
         match &self.linear {
             Linear::Axes(axes) => axes.iter().try_for_each(|axis| axis.check("linear", -MOST_LENGTH, MOST_LENGTH))?,
             Linear::Distance(distance) => {
-                let message = || "distance: locked at zero, which is a ball joint".into();
+                let message = || "distance: locked at zero: use a ball joint".into();
                 ensure(distance.bounds != Bounds::Locked, message)?;
                 distance.check("distance", 0.0, MOST_LENGTH)?;
             }
@@ -171,8 +172,7 @@ impl Axis {
             let is_range = ascend && is_bound(min, f32::NEG_INFINITY) && is_bound(max, f32::INFINITY);
             ensure(is_range, || format!("{name}: limits {min} and {max}: must ascend, within {least} and {most}"))?;
         }
-        let message =
-            || format!("{name}: a locked axis has a motor or a spring, which cannot move it: free or limit the axis");
+        let message = || format!("{name}: a motor or a spring cannot move a locked axis: free or limit the axis");
         ensure(self.bounds != Bounds::Locked || self.drive == Drive::None, message)?;
         let max_load = match self.drive {
             Drive::None => return Ok(()),
@@ -207,7 +207,7 @@ mod tests {
         }
     }
 
-    /// Twice a small turn apart, angles differ by as much as their speeds say.
+    /// The check compares angles with speeds across two small rotations.
     #[test]
     fn speeds_are_the_changes_of_angles_at_any_angle() {
         let mut world = World::new();

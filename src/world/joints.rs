@@ -1,4 +1,4 @@
-//! The joints of a world, which come and go.
+//! The joints of a world. Joints can be inserted and removed at any time.
 
 use std::fmt;
 use std::ops::{Deref, Index, IndexMut};
@@ -7,7 +7,8 @@ use std::slice;
 use super::joint::Joint;
 use super::tag::WorldTag;
 
-/// Names one joint for as long as the joint is in its world. Another world refuses it as it does a [`BodyHandle`](super::BodyHandle).
+/// Identifies one joint for as long as the joint is in its world. Another world refuses it, like a
+/// [`BodyHandle`](super::BodyHandle).
 ///
 /// ```
 /// use drystone::{Body, Joint, JointHandle, World, glam::Vec3};
@@ -26,7 +27,7 @@ pub struct JointHandle {
     tag: WorldTag,
 }
 
-/// Without its world, as that of a [`BodyHandle`](super::BodyHandle).
+/// Leaves the world tag out, like that of a [`BodyHandle`](super::BodyHandle).
 impl fmt::Debug for JointHandle {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { number, generation, tag: _ } = self;
@@ -36,9 +37,9 @@ impl fmt::Debug for JointHandle {
 
 crate::saved::fields!(JointHandle { number, generation } scratch { tag });
 
-/// The joints of a world: a slice in the order in which they were inserted. The index of a joint falls by one with each joint before it that
-/// is removed; its handle stays. Joints can be changed one by one, and not sorted or swapped as a slice: handles would then name
-/// other joints.
+/// The joints of a world: a slice in order of insertion. When a joint is removed, the index of every later joint falls
+/// by one, but its handle stays valid. Joints can be changed one by one, but must not be sorted or swapped as a slice:
+/// handles would then name other joints.
 ///
 /// ```
 /// use drystone::{Body, Joint, World, glam::Vec3, world::Joints};
@@ -59,9 +60,9 @@ pub struct Joints {
     all: Vec<Joint>,
     /// The handle of each.
     handles: Vec<JointHandle>,
-    /// The generation of each number, and the index of its joint; none if the number is free.
+    /// Generation of each number, and the index of its joint or `None` if the number is free.
     numbers: Vec<(u32, Option<u32>)>,
-    /// Numbers without a joint; the last is given first.
+    /// Free numbers. The last one is used first.
     free: Vec<u32>,
     tag: WorldTag,
 }
@@ -70,12 +71,12 @@ crate::saved::fields!(Joints { all, handles, numbers, free } scratch { tag });
 crate::saved::cloned!(Joints { all, handles, numbers, free, tag });
 
 impl Joints {
-    /// None yet, of a world with this tag.
+    /// No joints yet, for a world with this tag.
     pub(super) fn of_world(tag: WorldTag) -> Self {
         Self { tag, ..Self::default() }
     }
 
-    /// Adds a joint behind the others.
+    /// Appends a joint.
     pub(super) fn insert(&mut self, joint: Joint) -> JointHandle {
         let number = self.free.pop().unwrap_or_else(|| {
             self.numbers.push((0, None));
@@ -89,7 +90,7 @@ impl Joints {
         handle
     }
 
-    /// Takes a joint out; none if it is gone.
+    /// Removes a joint. Returns `None` if it is already gone.
     pub(super) fn remove(&mut self, handle: JointHandle) -> Option<Joint> {
         let index = self.index(handle)?;
         let joint = self.all[index];
@@ -98,7 +99,7 @@ impl Joints {
         Some(joint)
     }
 
-    /// Whether every joint has its number.
+    /// Whether numbers and joints refer to each other.
     pub(crate) fn are_consistent(&self) -> bool {
         let Self { all, handles, numbers, free, tag: _ } = self;
         let is_free = |&number: &u32| numbers.get(number as usize).is_some_and(|number| number.1.is_none());
@@ -107,7 +108,7 @@ impl Joints {
             && free.iter().all(is_free)
     }
 
-    /// Keeps the joints that `keep` takes.
+    /// Keeps the joints for which `keep` returns true.
     pub fn retain(&mut self, mut keep: impl FnMut(&Joint) -> bool) {
         let mut kept = 0;
         for index in 0..self.all.len() {
@@ -127,18 +128,18 @@ impl Joints {
         self.handles.truncate(kept);
     }
 
-    /// Removes all.
+    /// Removes all joints.
     pub fn clear(&mut self) {
         self.retain(|_| false);
     }
 
-    /// The index of a joint; none if it is gone.
+    /// The index of a joint. Returns `None` if the joint is gone.
     pub fn index(&self, handle: JointHandle) -> Option<usize> {
         let &(generation, index) = self.numbers.get(handle.number as usize)?;
         index.filter(|_| generation == handle.generation && handle.tag.fits(self.tag)).map(|index| index as usize)
     }
 
-    /// All joints, to be changed.
+    /// All joints, mutable.
     pub fn iter_mut(&mut self) -> slice::IterMut<'_, Joint> {
         self.all.iter_mut()
     }

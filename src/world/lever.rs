@@ -1,4 +1,4 @@
-//! The least inertia that a body has beside the size of its shapes.
+//! The smallest inertia that a body can have for the size of its shapes.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use super::body::{Body, BodyKind, Collider};
 use super::mass::MassProperties;
 use super::shape::{placed, pose};
 
-/// Raises the moments of inertia of a body to what [`MassProperties::MOST_LEVERAGE`] asks for.
+/// Raises the moments of inertia of a body to the limit that [`MassProperties::MOST_LEVERAGE`] sets.
 pub(super) fn raise_inertia(body: &mut Body) {
     if body.kind == BodyKind::Dynamic {
         let least = squared_levers(&body.mass, &body.colliders) * (body.mass.mass / MassProperties::MOST_LEVERAGE);
@@ -14,7 +14,8 @@ pub(super) fn raise_inertia(body: &mut Body) {
     }
 }
 
-/// The square of the largest distance of a point of the shapes from each principal axis, or a little more (m²).
+/// Upper bound of the squared distance between the shapes and each principal axis (m²). It can exceed the exact maximum
+/// a little.
 fn squared_levers(mass: &MassProperties, colliders: &[Collider]) -> Vec3 {
     let to_axes = pose(mass.center, mass.principal_frame).inverse();
     let of_one = |collider: &Collider| {

@@ -1,23 +1,24 @@
-//! Ranges of the numbers of a world.
+//! Valid ranges of the numbers of a world.
 
 use glam::{Quat, Vec3};
 
 use crate::error::{Result, ensure};
 use crate::math::rotation::squared_length;
 
-/// Largest coordinate and size (m): its cube is still a number in single precision.
+/// Largest coordinate and size (m). Its cube is still finite in single precision.
 pub const MOST_LENGTH: f32 = 1e9;
-/// Largest speed that a caller gives (m/s), (rad/s).
+/// Largest speed that a caller can set (m/s, rad/s).
 pub const MOST_SPEED: f32 = 1e9;
-/// Largest acceleration along an axis, of gravity (m/s²) and by the force (m/s²) and the torque (rad/s²) on a body.
+/// Largest acceleration along an axis: by gravity (m/s²), by the force on a body (m/s²), and by the torque on a body
+/// (rad/s²).
 pub const MOST_GRAVITY: f32 = 1e9;
 
-/// Whether every coordinate of a point is a number of at most [`MOST_LENGTH`].
+/// Whether every coordinate of a point is at most [`MOST_LENGTH`] in size; false for NaN.
 pub(super) fn is_place(point: Vec3) -> bool {
     is_within(point, MOST_LENGTH)
 }
 
-/// Whether every component is a number of at most `most` in size.
+/// Whether every component is at most `most` in size; false for NaN.
 pub(super) fn is_within(x: Vec3, most: f32) -> bool {
     x.abs().cmple(Vec3::splat(most)).all()
 }
@@ -27,12 +28,12 @@ pub(super) fn is_rotation(q: Quat) -> bool {
     (squared_length(q).sqrt() - 1.0).abs() <= 1e-3
 }
 
-/// Refuses a point that is no place.
+/// Refuses a point out of range.
 pub(super) fn check_place(name: &str, point: Vec3) -> Result<()> {
     ensure(is_place(point), || format!("{name} = {point}: must be at most {MOST_LENGTH:e} m in size"))
 }
 
-/// Refuses a quaternion that is no rotation.
+/// Refuses a quaternion that is not a rotation.
 pub(super) fn check_rotation(name: &str, q: Quat) -> Result<()> {
     ensure(is_rotation(q), || format!("{name} = {q}: must have unit length"))
 }

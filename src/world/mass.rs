@@ -15,7 +15,7 @@ use crate::error::{Result, ensure};
 use crate::math::rotation::product;
 use crate::stats::largest;
 
-/// Mass, center of mass and inertia of a body, in its own frame. All zero for a body that cannot be pushed.
+/// Mass, center of mass and inertia of a body, in the body's frame. All are zero for a body of infinite mass.
 ///
 /// ```
 /// use drystone::{Body, MassProperties, Shape, glam::{Mat3, Quat}};
@@ -33,7 +33,7 @@ use crate::stats::largest;
 pub struct MassProperties {
     /// Mass (kg).
     pub mass: f32,
-    /// Centre of mass in the body's frame (m).
+    /// Center of mass in the body's frame (m).
     pub center: Vec3,
     /// Moments of inertia about the principal axes (kg m²).
     pub principal_inertia: Vec3,
@@ -44,20 +44,21 @@ pub struct MassProperties {
 crate::saved::fields!(MassProperties { mass, center, principal_inertia, principal_frame });
 
 impl MassProperties {
-    /// Infinite mass.
+    /// Infinite mass: contacts cannot move the body.
     pub const IMMOVABLE: Self =
         Self { mass: 0.0, center: Vec3::ZERO, principal_inertia: Vec3::ZERO, principal_frame: Quat::IDENTITY };
 
-    /// Masses that can be simulated (kg): squares of impulses and of inverse masses stay numbers in single precision.
+    /// Range of masses that can be simulated (kg). Squares of impulses and of inverse masses stay finite in single
+    /// precision.
     pub const MASSES: RangeInclusive<f32> = 1e-15..=1e15;
-    /// Moments of inertia that can be simulated (kg m²).
+    /// Range of moments of inertia that can be simulated (kg m²).
     pub const MOMENTS: RangeInclusive<f32> = 1e-30..=1e30;
-    /// Largest ratio of two moments of a body; that of a rod is a sixth of the square of its length over its radius.
+    /// Largest ratio of two moments of a body. For a rod the ratio is (length / radius)² / 6.
     pub const MOST_RATIO: f32 = 1e12;
 
-    /// Largest ratio of m r² to a moment of inertia that a simulation takes, r the lever of the shapes about that axis. The ratio is 3 for
-    /// boxes, 2.5 for balls and 20 at most for cones. From about 100 on sweeps point by point never bring a body to rest
-    /// (docs/derivation.md, section 3).
+    /// Largest ratio of m r² to a moment of inertia that a simulation accepts, where r is the lever of the shapes about
+    /// that axis. The ratio is 3 for boxes, 2.5 for balls and at most 20 for cones. From about 100 on, sweeps that
+    /// solve one point at a time never bring a body to rest (docs/derivation.md, section 3).
     pub const MOST_LEVERAGE: f32 = 32.0;
 
     /// Refuses a mass or an inertia that no dynamic body can have.
@@ -76,7 +77,7 @@ impl MassProperties {
         })
     }
 
-    /// Refuses a center out of range, and a frame that is no rotation.
+    /// Refuses a center of mass that is out of range, and a frame that is not a rotation.
     pub(super) fn check_frame(&self) -> Result<()> {
         let Self { center, principal_frame, .. } = *self;
         let message = || {
@@ -85,12 +86,13 @@ impl MassProperties {
         ensure(is_place(center) && is_rotation(principal_frame), message)
     }
 
-    /// Those of some colliders with volume. Parry keeps inverses: taken at density 1 and scaled here, a box of 1 m³ weighs its density to the
-    /// last bit.
+    /// Mass properties of some colliders with volume. Parry stores inverses. They are computed at density 1 and scaled
+    /// here, so that the mass of a box of 1 m³ equals its density to the last bit.
     ///
-    /// Parry's principal axes are taken only where the solids have theirs along the axes of the body: others need a sine, and the platform's
-    /// differ. Parry also finds wrong axes where the smallest moment is a double one whose plane is not that of x, or where moments are below
-    /// 1e-5 kg m²: its tensor is compared with the sum of the tensors of the solids.
+    /// Parry's principal axes are used only if the principal axes of the solids are parallel to the axes of the body:
+    /// other directions need a sine, and platforms compute it differently. Parry also finds wrong axes in two cases: if
+    /// the two smaller moments are equal and their plane is not that of x, or if moments are below 1e-5 kg m².
+    /// Therefore its tensor is compared with the sum of the tensors of the solids.
     pub(super) fn of_solids(solids: &[&Collider], density: f32) -> Self {
         let solids: Vec<_> = solids.iter().map(|c| (Solid::of(c), pose(c.position, c.rotation))).collect();
         let all: ParryMass = solids.iter().map(|(solid, at)| solid.mass.transform_by(at)).sum();
@@ -121,7 +123,7 @@ impl MassProperties {
         }
     }
 
-    /// Inverse inertia about the center of mass in world axes, for a body with rotation `rotation` (1/(kg m²)).
+    /// Inverse inertia about the center of mass in world axes (1/(kg m²)), for a body with this rotation.
     pub fn world_inverse_inertia(&self, rotation: Quat) -> Mat3 {
         self.world_tensor(rotation, self.principal_inertia.map(|i| if i > 0.0 { 1.0 / i } else { 0.0 }))
     }
@@ -132,7 +134,7 @@ impl MassProperties {
     }
 
     fn world_tensor(&self, rotation: Quat, principal: Vec3) -> Mat3 {
-        // Turning an isotropic tensor only adds rounding.
+        // A rotation of an isotropic tensor only adds rounding errors.
         if principal.x == principal.y && principal.y == principal.z {
             return Mat3::from_diagonal(principal);
         }
@@ -140,7 +142,7 @@ impl MassProperties {
         axes * Mat3::from_diagonal(principal) * axes.transpose()
     }
 
-    /// Whether the moments differ, so that a free rotation changes its axis (gyroscopic term).
+    /// Whether the moments differ. The axis of a free rotation then moves (gyroscopic term).
     pub fn is_anisotropic(&self) -> bool {
         let i = self.principal_inertia;
         i.max_element() - i.min_element() > 1e-6 * i.max_element()
@@ -165,7 +167,8 @@ impl Solid {
     }
 }
 
-/// Inertia of a hull of density 1 about its center of mass: the sum of the tetrahedra that its triangles make with the center.
+/// Inertia of a hull of density 1 about its center of mass. It sums the tetrahedra between the triangles and the
+/// center.
 fn tensor_of_hull(hull: &ConvexPolyhedron, center: Vec3) -> DMat3 {
     let (points, triangles) = hull.to_trimesh();
     let of_one = |triangle: &[u32; 3]| {
@@ -174,7 +177,7 @@ fn tensor_of_hull(hull: &ConvexPolyhedron, center: Vec3) -> DMat3 {
         tetrahedron_unit_inertia_tensor_wrt_point(center, center, a, b, c) * volume
     };
     let whole: Mat3 = triangles.iter().map(of_one).fold(Mat3::ZERO, |sum, own| sum + own);
-    // A hull whose triangles turn inward has a negative volume.
+    // A hull with triangles that face inward has a negative volume.
     whole.as_dmat3() * f64::from(whole.x_axis.x.signum())
 }
 
@@ -183,7 +186,7 @@ fn axes_of(frame: Quat) -> DMat3 {
     DMat3::from_quat(frame.as_dquat().normalize())
 }
 
-/// The tensor with some moments along the axes of a frame.
+/// The inertia tensor with these moments along the axes of a frame.
 fn tensor(moments: Vec3, frame: Quat) -> DMat3 {
     let axes = axes_of(frame);
     axes * DMat3::from_diagonal(moments.as_dvec3()) * axes.transpose()
@@ -193,8 +196,8 @@ fn diagonal(tensor: &DMat3) -> DVec3 {
     DVec3::new(tensor.x_axis.x, tensor.y_axis.y, tensor.z_axis.z)
 }
 
-/// Principal moments of a symmetric tensor, and the rotation from its principal axes. Jacobi's method: each turn about one axis removes one
-/// entry beside the diagonal, and the others get smaller.
+/// Principal moments of a symmetric tensor, and the rotation from its principal axes, by Jacobi's method. Each rotation
+/// about one axis zeroes one off-diagonal entry and makes the others smaller.
 fn diagonalized(tensor: DMat3) -> (Vec3, Quat) {
     const SWEEPS: usize = 8;
     let (mut diagonal, mut axes) = (tensor, DMat3::IDENTITY);

@@ -1,4 +1,4 @@
-//! Bodies, shapes, joints and materials. SI units, right-handed, Y up in the catalogue.
+//! Bodies, shapes, joints and materials. Units are SI, the axes are right-handed, and Y is up in the catalogue.
 
 mod bodies;
 mod body;
@@ -39,7 +39,8 @@ use tag::WorldTag;
 
 /// A set of rigid bodies.
 ///
-/// Bodies and joints come and go at any time, also while a [`Simulation`](crate::Simulation) has the world:
+/// Bodies and joints can be added and removed at any time, also while a [`Simulation`](crate::Simulation) owns the
+/// world:
 ///
 /// ```
 /// use drystone::{Body, Shape, World};
@@ -58,7 +59,7 @@ use tag::WorldTag;
 /// let mut world = World::new();
 /// let [a, b] = [0.0, 2.0].map(|x| world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).position(x, 1.0, 0.0)));
 /// world.bodies[a].linear_velocity = Vec3::X;
-/// // Joints have handles too, and an index until one before them goes.
+/// // Joints have handles too. Their index changes when an earlier joint is removed.
 /// let rod = world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).rod(1.9));
 /// world.joint_mut(rod).expect("just put in").break_force = 100.0;
 /// assert_eq!(world.anchors(world.joint(rod).expect("still there")), [Vec3::Y, Vec3::new(2.0, 1.0, 0.0)]);
@@ -72,7 +73,7 @@ use tag::WorldTag;
 /// assert!((world.potential_energy() - 2.0 * 9.81).abs() < 1e-5);
 /// assert_eq!((world.angular_momentum().z, world.gravity_on(a).y), (-1.0, -9.81));
 ///
-/// // A second world beside the first, whose bodies never meet those of the first.
+/// // A second world beside the first. Its bodies never meet those of the first.
 /// world.beside(&World::new());
 /// let other = world.insert_in(1, Body::fixed())?;
 /// assert_eq!((world.world_count(), world.worlds()[1].clone()), (2, vec![other.index()]));
@@ -80,11 +81,13 @@ use tag::WorldTag;
 /// ```
 #[derive(Debug)]
 pub struct World {
-    /// Acceleration of gravity (m/s²) in every world without one of its own. A body feels its [`Body::gravity_scale`] of it.
+    /// Acceleration of gravity (m/s²), in every world without its own gravity. [`Body::gravity_scale`] scales it for
+    /// each body.
     pub gravity: Vec3,
-    /// Gravity of single worlds of those that stand [beside](World::beside) each other (m/s²); none, and of those beyond its end, `gravity`.
+    /// Gravity of individual worlds that stand [beside](World::beside) each other (m/s²). A world with `None`, or
+    /// beyond the end of the list, has `gravity`.
     pub own_gravity: Vec<Option<Vec3>>,
-    /// The bodies. Joints and contacts name a body by its index here, which stays as long as the body does.
+    /// The bodies. Joints and contacts refer to a body by its index, which stays the same until the body is removed.
     pub bodies: Bodies,
     /// The joints.
     pub joints: Joints,
@@ -105,12 +108,13 @@ impl World {
         Self { gravity, own_gravity: Vec::new(), bodies: Bodies::of_world(tag), joints: Joints::of_world(tag) }
     }
 
-    /// Gravity in one of the worlds beside each other (m/s²).
+    /// Gravity in one of the worlds that stand beside each other (m/s²).
     pub fn gravity_of(&self, world: usize) -> Vec3 {
         self.own_gravity.get(world).copied().flatten().unwrap_or(self.gravity)
     }
 
-    /// Acceleration of a body by gravity (m/s²): that of its world times its [`Body::gravity_scale`], and zero unless it is dynamic.
+    /// Acceleration of a body by gravity (m/s²): the gravity of its world times [`Body::gravity_scale`], or zero if the
+    /// body is not dynamic.
     pub fn gravity_on(&self, body: usize) -> Vec3 {
         match self.bodies.get(body) {
             Some(&Body { kind: BodyKind::Dynamic, gravity_scale, .. }) => {
@@ -120,13 +124,13 @@ impl World {
         }
     }
 
-    /// Adds a body to the last world and returns its index, as [`World::insert`] does its handle. Where bodies are removed, an
-    /// index does not tell a body from the next one in its place.
+    /// Adds a body to the last world and returns its index. [`World::insert`] returns its handle instead. If bodies are
+    /// removed, an index does not tell a body from the next body at the same index.
     pub fn add(&mut self, body: Body) -> usize {
         self.insert(body).index()
     }
 
-    /// Adds a body to the last world.
+    /// Adds a body to the last world and returns its handle.
     pub fn insert(&mut self, body: Body) -> BodyHandle {
         self.bodies.insert(self.world_count() - 1, body)
     }
@@ -141,7 +145,7 @@ impl World {
         Ok(self.bodies.insert(world, body))
     }
 
-    /// Takes a body out, with all joints that hold it; none if it is gone already.
+    /// Removes a body together with all joints that hold it. Returns `None` if the body is already gone.
     pub fn remove(&mut self, body: BodyHandle) -> Option<Body> {
         let removed = self.bodies.remove(body)?;
         if self.joints.iter().any(|joint| joint.holds(body)) {
@@ -150,23 +154,24 @@ impl World {
         Some(removed)
     }
 
-    /// A body; none if it is gone.
+    /// A body, or `None` if it is gone.
     pub fn body(&self, body: BodyHandle) -> Option<&Body> {
         self.bodies.contains(body).then(|| &self.bodies[body.index()])
     }
 
-    /// A body, to be changed; none if it is gone.
+    /// A mutable body, or `None` if it is gone.
     pub fn body_mut(&mut self, body: BodyHandle) -> Option<&mut Body> {
         self.bodies.contains(body).then(|| &mut self.bodies[body.index()])
     }
 
-    /// Adds a joint and returns its index, as [`World::insert_joint`] does its handle.
+    /// Adds a joint and returns its index. [`World::insert_joint`] returns its handle instead.
     pub fn join(&mut self, joint: Joint) -> usize {
         self.insert_joint(joint);
         self.joints.len() - 1
     }
 
-    /// Adds a joint. [`World::check`] and the next step refuse one that cannot be simulated: of a body that is gone, for instance.
+    /// Adds a joint and returns its handle. [`World::check`] and the next step refuse an invalid joint, for example to
+    /// a body that is gone.
     ///
     /// ```
     /// use drystone::{Body, Joint, Shape, World, glam::Vec3};
@@ -183,23 +188,23 @@ impl World {
         self.joints.insert(joint)
     }
 
-    /// Takes a joint out; none if it is gone already.
+    /// Removes a joint. Returns `None` if it is already gone.
     pub fn remove_joint(&mut self, joint: JointHandle) -> Option<Joint> {
         self.joints.remove(joint)
     }
 
-    /// A joint; none if it is gone.
+    /// A joint, or `None` if it is gone.
     pub fn joint(&self, joint: JointHandle) -> Option<&Joint> {
         self.joints.index(joint).map(|index| &self.joints[index])
     }
 
-    /// A joint, to be changed; none if it is gone.
+    /// A mutable joint, or `None` if it is gone.
     pub fn joint_mut(&mut self, joint: JointHandle) -> Option<&mut Joint> {
         self.joints.index(joint).map(|index| &mut self.joints[index])
     }
 
-    /// Sets another world beside this one: its bodies and joints follow those of this world, and bodies of different worlds never
-    /// meet, wherever they are. Where the gravity of the two differs, the other one's is its own.
+    /// Appends another world. Its bodies and joints follow those of this world. Bodies of different worlds never meet,
+    /// wherever they are. The other world keeps its own gravity if the two differ.
     ///
     /// ```
     /// use drystone::{World, glam::Vec3};
@@ -237,7 +242,7 @@ impl World {
         worlds
     }
 
-    /// Where the two anchors of a joint are in the world (m); NaN on a body that is gone.
+    /// Positions of the two anchors of a joint in the world (m). An anchor on a removed body is NaN.
     pub fn anchors(&self, joint: &Joint) -> [Vec3; 2] {
         let on_body =
             |b: BodyHandle, anchor: Vec3| self.body(b).map_or(Vec3::NAN, |b| b.position + b.rotation * anchor);
@@ -245,18 +250,26 @@ impl World {
         [on_a, joint.body_b.map_or(joint.anchor_b, |b| on_body(b, joint.anchor_b))]
     }
 
-    /// Largest gap that is not to be in any joint (m): how far its anchors are apart along axes that are locked, and beyond its limits.
+    /// Largest error of any joint (m): the distance of its anchors along locked axes, and beyond its limits.
     pub fn joint_gap(&self) -> f32 {
         self.joints.iter().map(|joint| self.joint_motion(joint).gap(joint)).fold(0.0, f32::max)
     }
 
-    /// Refuses a world that cannot be simulated: numbers that are not finite or out of range, shapes without extent, dynamic bodies
-    /// without mass or with a mass out of [`MassProperties::MASSES`], moving bodies with shapes that only fixed bodies can have,
-    /// joints to bodies that do not exist, joints that tie a fixed body to another one or to the world, joints whose axis has no direction,
-    /// and limits, motors and springs where every axis is locked. A body may become fixed later, with all of its joints.
+    /// Refuses a world that cannot be simulated:
+    ///
+    /// - numbers that are not finite or are out of range;
+    /// - shapes without extent;
+    /// - dynamic bodies without mass, or with a mass out of [`MassProperties::MASSES`];
+    /// - moving bodies with shapes that only fixed bodies can have;
+    /// - joints to bodies that do not exist;
+    /// - joints between a fixed body and the world or another fixed body;
+    /// - joints whose axis has no direction;
+    /// - limits, motors and springs on joints with every axis locked.
+    ///
+    /// A body can become fixed later, with all its joints.
     ///
     /// # Errors
-    /// One line that names the body and its shape, or the joint.
+    /// One line names the body and its shape, or the joint.
     pub fn check(&self) -> Result<()> {
         self.check_gravity()?;
         (0..self.bodies.len()).try_for_each(|i| self.check_body(i))?;
@@ -270,12 +283,12 @@ impl World {
         })
     }
 
-    /// Raises the moments of inertia that no sweep can work with: [`MassProperties::MOST_LEVERAGE`].
+    /// Raises moments of inertia that are too small for the sweeps: see [`MassProperties::MOST_LEVERAGE`].
     pub(crate) fn raise_inertias(&mut self) {
         self.bodies.iter_mut().for_each(lever::raise_inertia);
     }
 
-    /// Refuses a gravity of more than [`MOST_GRAVITY`], or one that is no number.
+    /// Refuses a gravity above [`MOST_GRAVITY`], or NaN.
     pub(crate) fn check_gravity(&self) -> Result<()> {
         std::iter::once(self.gravity).chain(self.own_gravity.iter().flatten().copied()).try_for_each(|gravity| {
             let message = || format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis");
@@ -288,18 +301,18 @@ impl World {
         self.bodies.iter().enumerate().try_for_each(|(i, body)| check_one(i, body, Body::check_surface))
     }
 
-    /// Refuses a body that cannot be simulated, by its index.
+    /// Refuses an invalid body, by its index.
     pub(crate) fn check_body(&self, i: usize) -> Result<()> {
         let check = |body: &Body| self.bodies.check_place(i).and_then(|()| Body::check(body));
         self.bodies.get(i).map_or(Ok(()), |body| check_one(i, body, check))
     }
 
-    /// How messages name a body; by its number alone if there is none.
+    /// The name of a body in messages, or its index if there is no such body.
     pub(crate) fn name_of(&self, i: usize) -> String {
         self.bodies.get(i).map_or_else(|| format!("body {i}"), |body| name_of(i, body))
     }
 
-    /// Refuses joints to bodies that do not exist, and anchors out of range.
+    /// Refuses joints to bodies that do not exist, and anchors that are out of range.
     pub(crate) fn check_joints(&self) -> Result<()> {
         for (i, joint) in self.joints.iter().enumerate() {
             let bodies = [Some(joint.body_a), joint.body_b];
@@ -355,12 +368,12 @@ impl World {
     }
 }
 
-/// Refuses a body for which `check` does, in a line that names it.
+/// Refuses a body if `check` does, in a message that names the body.
 fn check_one(i: usize, body: &Body, check: impl Fn(&Body) -> Result<()>) -> Result<()> {
     check(body).map_err(|e| e.within(name_of(i, body)))
 }
 
-/// How messages name a body.
+/// The name of a body in messages.
 fn name_of(i: usize, body: &Body) -> String {
     format!("body {i} {:?}", body.name)
 }

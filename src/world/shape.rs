@@ -1,4 +1,4 @@
-//! The shapes of bodies, made by parry.
+//! The shapes of bodies, built on parry.
 
 use std::fmt;
 use std::sync::Arc;
@@ -11,10 +11,10 @@ use super::limits::{MOST_LENGTH, is_place};
 use crate::error::{Error, Result, ensure, input};
 use crate::math::rotation;
 
-/// A geometric shape in its own frame. Cheap to clone: the geometry is shared.
+/// A geometric shape in its own frame. Clones are cheap: they share the geometry.
 ///
-/// Ball, cuboid, capsule, cylinder, cone and convex hull can be on any body; triangle mesh and height field not on dynamic
-/// ones, since they have no mass; half-space only on fixed ones.
+/// Any body can have a ball, cuboid, capsule, cylinder, cone or convex hull. A triangle mesh or height field has no
+/// mass, so a dynamic body cannot have one. Only a fixed body can have a half-space.
 ///
 /// ```
 /// use drystone::{Shape, glam::Vec3};
@@ -58,7 +58,7 @@ impl Shape {
         Self(SharedShape::cuboid(half_x, half_y, half_z), None)
     }
 
-    /// A capsule along Y: a segment of `half_height` either way, swept by `radius` (m).
+    /// A capsule along Y: a segment from -`half_height` to `half_height`, swept by `radius` (m).
     pub fn capsule(half_height: f32, radius: f32) -> Self {
         Self(SharedShape::capsule_y(half_height, radius), None)
     }
@@ -79,7 +79,7 @@ impl Shape {
     /// # Errors
     /// Fewer than four points, or points that span no volume.
     pub fn convex_hull(points: &[Vec3]) -> Result<Self> {
-        // Checked here, because a flat cloud makes the hull code panic rather than refuse.
+        // Check here: the hull code panics on a flat point cloud.
         let hull = spans_volume(points).then(|| SharedShape::convex_hull(points)).flatten();
         hull.map(|hull| Self(hull, Some(points.into())))
             .ok_or_else(|| input!("a convex hull of {} points that spans no volume", points.len()))
@@ -90,10 +90,10 @@ impl Shape {
         Self(SharedShape::halfspace(normal), None)
     }
 
-    /// A triangle mesh: vertices (m) and counter-clockwise triangles seen from outside.
+    /// A triangle mesh: vertices (m) and triangles. Triangles are counter-clockwise seen from outside.
     ///
     /// # Errors
-    /// No triangle, an index that names no vertex, or a vertex that is no point.
+    /// There is no triangle, an index names no vertex, or a vertex is out of range or NaN.
     pub fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
         if let Some(t) = triangles.iter().find(|t| t.iter().any(|&i| i as usize >= vertices.len())) {
             let count = vertices.len();
@@ -106,11 +106,13 @@ impl Shape {
         mesh.map(|mesh| Self(mesh, None)).map_err(|e| input!("mesh: {e}"))
     }
 
-    /// A height field over the XZ plane: `heights[row][column]`, rows along Z, columns along X, stretched to `scale` (m).
-    /// Like a mesh it has one side, the upper one, and bodies do not stumble over the edges between its triangles.
+    /// A height field over the XZ plane: `heights[row][column]`, with rows along Z and columns along X, scaled by
+    /// `scale` (m). Like a mesh, it has one side, the upper one. Bodies do not catch on the edges between its
+    /// triangles.
     ///
     /// # Errors
-    /// Fewer than two rows or columns, rows of unequal length, or a height or scale that is no length.
+    /// There are fewer than two rows or columns, rows have unequal lengths, or a height or the scale is out of range or
+    /// NaN.
     pub fn height_field(heights: &[Vec<f32>], scale: Vec3) -> Result<Self> {
         let rows = heights.len();
         let columns = heights.first().map_or(0, Vec::len);
@@ -131,7 +133,7 @@ impl Shape {
     /// Refuses a shape without extent, or with a number that is not finite or larger than [`MOST_LENGTH`].
     ///
     /// # Errors
-    /// One line that names the shape, the number and its range.
+    /// One line names the shape, the number and its range.
     pub(crate) fn check(&self) -> Result<()> {
         let sizes = |kind: &str, sizes: &[(&str, f32)]| {
             sizes.iter().try_for_each(|(name, size)| {
@@ -150,7 +152,7 @@ impl Shape {
             TypedShape::Cone(c) => sizes("cone", &[("half height", c.half_height), ("radius", c.radius)]),
             TypedShape::HalfSpace(plane) => {
                 let (normal, length) = (plane.normal, plane.normal.length());
-                let message = || format!("half-space of normal {normal}: must have length 1, but has length {length}");
+                let message = || format!("half-space: normal {normal} must have length 1, but has length {length}");
                 ensure((length - 1.0).abs() <= 1e-3, message)
             }
             _ => {
@@ -161,12 +163,12 @@ impl Shape {
         }
     }
 
-    /// Whether this is the same shape, and not only an equal one.
+    /// Whether both share one geometry. Equal copies do not count.
     pub(crate) fn is(&self, other: &Self) -> bool {
         std::sync::Arc::ptr_eq(&self.0.0, &other.0.0)
     }
 
-    /// Whether the shape has a finite volume, so that a body with it can have mass from density.
+    /// Whether the shape has a finite volume. Then the mass of a body can follow from its density.
     pub fn has_volume(&self) -> bool {
         !self.is_half_space() && self.0.as_trimesh().is_none() && self.0.as_heightfield().is_none()
     }
@@ -181,23 +183,25 @@ impl Shape {
         self.0.as_halfspace().is_some()
     }
 
-    /// Half extents if this is a cuboid (m).
+    /// Half extents of a cuboid (m), or `None` for another shape.
     pub fn as_cuboid(&self) -> Option<Vec3> {
         self.0.as_cuboid().map(|c| c.half_extents)
     }
 
-    /// Radius of the smallest sphere around the shape's own origin that contains it (m); infinite for a half-space.
+    /// Radius of the smallest sphere around the shape's own origin that contains the shape (m); infinite for a
+    /// half-space.
     pub fn bounding_radius(&self) -> f32 {
         let sphere = self.0.compute_local_bounding_sphere();
         sphere.center().length() + sphere.radius()
     }
 
-    /// The points that it is the convex hull of, if it is one. The hull of the corners alone may have them in another order.
+    /// The points that were given for a convex hull, or `None` for another shape. The hull of the corners alone can
+    /// have them in another order.
     pub(crate) fn hull_points(&self) -> Option<&[Vec3]> {
         self.1.as_deref()
     }
 
-    /// parry's shape, for use with another engine.
+    /// Parry's shape, for use with another engine.
     pub fn parry(&self) -> &SharedShape {
         &self.0
     }
@@ -208,7 +212,7 @@ impl Shape {
             return f32::INFINITY;
         }
         let extents = self.0.compute_local_aabb().half_extents();
-        // A flat mesh or height field is as thin as nothing: its other sides say how large it is.
+        // A flat mesh or height field has no thickness. Its longer sides give its size.
         if self.has_volume() { extents.min_element() } else { extents.max_element() }
     }
 }
@@ -218,12 +222,12 @@ pub(crate) fn pose(position: Vec3, rotation: Quat) -> Pose {
     Pose::from_parts(position, rotation)
 }
 
-/// The pose `local` as seen from where the frame of it has the pose `frame`.
+/// Converts the pose `local` out of the frame with the pose `frame`.
 pub(crate) fn placed(frame: Pose, local: Pose) -> Pose {
     pose(frame.translation + frame.rotation * local.translation, rotation::product(frame.rotation, local.rotation))
 }
 
-/// A pose as seen from another.
+/// The pose `of` in the frame of `other`.
 pub(crate) fn seen_from(other: Pose, of: Pose) -> Pose {
     let back = other.rotation.inverse();
     pose(back * (of.translation - other.translation), rotation::product(back, of.rotation))

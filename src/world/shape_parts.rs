@@ -1,4 +1,4 @@
-//! Shapes by what they were made of.
+//! Saves shapes by the parameters that they were built from.
 
 use std::sync::{Arc, LazyLock};
 
@@ -9,7 +9,7 @@ use super::Shape;
 use crate::error::{Result, input};
 use crate::saved::{Archive, Saved};
 
-/// What each kind of shape is made of.
+/// The parameters of each kind of shape.
 #[derive(Default)]
 struct Parts {
     kind: u8,
@@ -21,7 +21,7 @@ struct Parts {
 
 crate::saved::fields!(Parts { kind, sizes, points, triangles, rows });
 
-/// What was one shape is one again.
+/// A shape that was shared before saving is shared again after loading.
 impl Saved for Shape {
     fn blank() -> Self {
         static BLANK: LazyLock<Shape> = LazyLock::new(|| Shape::ball(1.0));
@@ -34,7 +34,7 @@ impl Saved for Shape {
     }
 }
 
-/// Writes what a shape was made of, or makes it again.
+/// Writes the parameters of a shape, or builds the shape from them.
 fn content<A: Archive>(shape: &mut Shape, archive: &mut A) -> Result<()> {
     let mut parts = if A::READS { Parts::default() } else { parts(shape)? };
     parts.walk(archive)?;
@@ -81,6 +81,6 @@ fn made_of(Parts { kind, sizes, points, triangles, rows }: Parts) -> Result<Shap
         6 => Shape::convex_hull(&points)?,
         7 => Shape::mesh(points, triangles)?,
         8 => Shape::height_field(&rows, sizes.into())?,
-        _ => return Err(input!("a shape of kind {kind} is not known")),
+        _ => return Err(input!("unknown kind of shape: {kind}")),
     })
 }

@@ -1,4 +1,4 @@
-//! The surface of a shape as triangles, for pictures, and its extent.
+//! The surface of a shape as triangles for pictures, and the extent of a shape.
 
 use glam::{Quat, Vec3};
 use parry3d::shape::TypedShape;
@@ -6,14 +6,14 @@ use parry3d::shape::TypedShape;
 use super::body::Collider;
 use super::shape::{Shape, placed, pose};
 
-/// Vertices (m) and triangles, counter-clockwise seen from outside.
+/// Vertices (m) and triangles. Triangles are counter-clockwise seen from outside.
 pub type Triangles = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// Segments of a circle.
 const SEGMENTS: u32 = 32;
 
 impl Shape {
-    /// The surface in the shape's own frame; a half-space gives a square of half side 1 m around its origin.
+    /// The surface in the shape's own frame. A half-space gives a square of half side 1 m around its origin.
     pub fn triangles(&self) -> Triangles {
         match self.0.as_typed_shape() {
             TypedShape::Ball(s) => s.to_trimesh(SEGMENTS, SEGMENTS / 2),
@@ -28,34 +28,34 @@ impl Shape {
                 let (u, v) = s.normal.any_orthonormal_pair();
                 (vec![-u - v, u - v, u + v, v - u], vec![[0, 1, 2], [0, 2, 3]])
             }
-            // `Shape` makes no others.
+            // `Shape` has no other kinds.
             _ => (Vec::new(), Vec::new()),
         }
     }
 
-    /// Volume (m³); 0 for shapes that enclose none.
+    /// Volume (m³); 0 for a shape that encloses no volume.
     pub fn volume(&self) -> f32 {
         if self.has_volume() { self.0.mass_properties(1.0).mass() } else { 0.0 }
     }
 
-    /// Outward normal of a half-space; none for other shapes.
+    /// Outward normal of a half-space, or `None` for another shape.
     pub fn as_half_space(&self) -> Option<Vec3> {
         self.0.as_halfspace().map(|s| s.normal)
     }
 
-    /// Radius of a ball (m); none for other shapes.
+    /// Radius of a ball (m), or `None` for another shape.
     pub fn as_ball(&self) -> Option<f32> {
         self.0.as_ball().map(|s| s.radius)
     }
 
-    /// Whether two shapes share one geometry, as clones do.
+    /// Whether two shapes share one geometry, like clones.
     pub fn is_same(&self, other: &Self) -> bool {
         std::ptr::addr_eq(&*self.0, &*other.0)
     }
 }
 
 impl Collider {
-    /// Lower and upper corner of the box along the world's axes around the collider, on a body at this pose (m).
+    /// Lower and upper corner of the collider's axis-aligned bounding box in the world, on a body at this pose (m).
     pub fn bounds(&self, position: Vec3, rotation: Quat) -> (Vec3, Vec3) {
         let aabb = self.shape.0.compute_aabb(&placed(pose(position, rotation), pose(self.position, self.rotation)));
         (aabb.mins, aabb.maxs)
@@ -66,7 +66,7 @@ impl Collider {
 mod tests {
     use super::*;
 
-    /// Volume inside of triangles that look outward (m³).
+    /// Volume inside triangles that face outward (m³).
     fn volume((vertices, triangles): &Triangles) -> f32 {
         let corner = |i: u32| vertices[i as usize];
         triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2]))) / 6.0).sum()

@@ -196,14 +196,14 @@ fn what_is_no_whole_recording_is_refused_in_one_line() {
     };
     for end in (0..bytes.len()).step_by(7) {
         let line = refusal(&bytes[..end]);
-        assert!(line.starts_with("a recording that cannot be replayed: ") && !line.contains('\n'), "{end}: {line}");
+        assert!(line.starts_with("the recording cannot be replayed: ") && !line.contains('\n'), "{end}: {line}");
     }
     for place in (8..bytes.len()).step_by(11) {
         let mut damaged = bytes.clone();
         damaged[place] ^= 0x55;
-        assert!(refusal(&damaged).starts_with("a recording that cannot be replayed: "), "byte {place}");
+        assert!(refusal(&damaged).starts_with("the recording cannot be replayed: "), "byte {place}");
     }
-    assert!(refusal(b"{}").contains("these bytes are none"));
+    assert!(refusal(b"{}").contains("these bytes are not a recording"));
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn late_inputs_give_the_bits_of_inputs_in_time() {
     }
     assert!(differed && rollback.len() == rollback.capacity());
     let line = rollback.back(9, &mut late).expect_err("eight states only").to_string();
-    assert_eq!(line, "9 steps back: 8 states are there");
+    assert_eq!(line, "cannot go back 9 steps: only 8 states are kept");
     assert_eq!(late.hash(), in_time.hash());
 }
 

@@ -286,7 +286,7 @@ fn bytes_that_are_damaged_or_cut_short_are_refused_in_one_line() {
     other[8] += 1;
     let line = refusal(&other);
     assert!(line.contains("version 5") && line.contains("reads 4"), "{line}");
-    assert!(refusal(b"a file of another program").contains("these bytes are none"));
+    assert!(refusal(b"a file of another program").contains("these bytes are not a saved run"));
 }
 
 /// A hash that follows a known definition: FNV-1a over the bytes of one ball.
@@ -356,7 +356,7 @@ fn bytes_that_end_anywhere_are_refused_without_help_of_the_hash() {
         assert!(!line.contains("hash"), "{length} bytes: {line}");
     }
     let line = refusal(&fitted([bytes, vec![0]].concat()));
-    assert!(line.contains("it goes on behind its end"), "{line}");
+    assert!(line.contains("it has bytes after its end"), "{line}");
 }
 
 /// The world is replaced between two steps, by a smaller one and by a larger one.

@@ -82,7 +82,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("body 2 \"\": shapes[0]: cone of radius", |w| {
             w.add(Body::fixed().shape(Shape::cone(1.0, 2e9)));
         }),
-        ("body 2 \"\": shapes[0]: half-space of normal", |w| {
+        ("body 2 \"\": shapes[0]: half-space: normal", |w| {
             w.add(Body::fixed().shape(Shape::half_space(3.0 * Vec3::Y)));
         }),
         ("body 2 \"\": shapes[0]: position", |w| {
@@ -133,7 +133,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("joint 0: all of its axes are locked", |w| _ = w.join(ball().fixed().motor(1.0, 1.0))),
         ("joint 0: all of its axes are locked", |w| _ = w.join(ball().fixed().spring(0.0, 1.0, 1.0))),
         ("joint 0: all of its axes are locked", |w| _ = w.join(ball().fixed().limited(-1.0, 1.0))),
-        ("joint 0: angular: a locked axis has a motor or a spring", |w| {
+        ("joint 0: angular: a motor or a spring cannot move a locked axis", |w| {
             w.join(ball().generic([Axis::FREE; 3], [Axis::LOCKED.motor(1.0, 1.0), Axis::FREE, Axis::FREE]));
         }),
         ("joint 0: linear: limits NaN and 1: must ascend", |w| {

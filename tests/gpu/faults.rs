@@ -78,7 +78,7 @@ fn a_device_that_is_lost_between_two_steps_costs_no_bit() {
     let options = GpuOptions { faults: losses(&[(60, false)]), ..exact() };
     let (faults, name) = run(&pile(60), &config, options, 75);
     let [(61, line)] = &faults[..] else { panic!("{faults:?}") };
-    assert_one_line(line, &["the device was lost (destroyed)", "gpu (", "repeats the step and goes on"]);
+    assert_one_line(line, &["the device was lost (destroyed)", "gpu (", "repeats the step and continues"]);
     assert_eq!(name, "gpu");
 }
 

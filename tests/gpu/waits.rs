@@ -56,7 +56,7 @@ fn steps_of_a_device_have_the_bits_of_steps_that_wait() {
 
 fn a_device_that_is_lost_costs_no_bit() {
     let lines = assert_same_bits(exact(vec![Loss { submission: 60, during: true }]), 70);
-    assert!(lines.len() == 1 && lines[0].contains("repeats the step and goes on"), "{lines:?}");
+    assert!(lines.len() == 1 && lines[0].contains("repeats the step and continues"), "{lines:?}");
 }
 
 /// The reference, whose steps pend once before they run.
@@ -110,7 +110,7 @@ fn a_dropped_step_is_refused_until_the_simulation_goes_back() {
     assert!(contacts > 20, "{contacts} contacts");
     for refusal in [theirs.step(dt), pollster::block_on(theirs.step_async(dt))] {
         let line = refusal.expect_err("a step after one that was dropped").to_string();
-        assert_eq!(line, "a step was dropped before its end: go back to a snapshot");
+        assert_eq!(line, "the future of a step was dropped before it completed: restore a snapshot");
     }
     theirs.restore(&before);
     (0..20).for_each(|_| step_both(&mut ours, &mut theirs));

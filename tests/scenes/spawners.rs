@@ -209,7 +209,7 @@ fn what_a_scene_file_cannot_say_is_refused_in_one_line() {
     scene.world.bodies[2].position.y = f32::NAN;
     let line = refusal(&scene);
     assert!(
-        line.starts_with("body 2 ") && line.ends_with("its numbers are not finite: no scene file can say them"),
+        line.starts_with("body 2 ") && line.ends_with("its numbers are not finite: a scene file cannot represent them"),
         "{line}"
     );
 }

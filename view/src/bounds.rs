@@ -1,4 +1,4 @@
-//! Boxes along the axes of the world.
+//! Axis-aligned boxes in the world.
 
 use glam::Vec3;
 
@@ -7,12 +7,12 @@ use drystone::{BodyHandle, BodyKind, World};
 
 /// Room on each side of a body, as a share of its size.
 const MARGIN: f32 = 0.25;
-/// Times the radius of a scene, beyond which a body that left the others counts as gone.
+/// Distance in radii of a scene beyond which a body that left the others counts as gone.
 pub(crate) const FAR: f32 = 4.0;
-/// One in so many bodies may be gone.
+/// At most one in this many bodies can be gone.
 const GONE: usize = 10;
 
-/// A box along the world's axes: lower and upper corner (m).
+/// An axis-aligned box: lower and upper corner (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     pub low: Vec3,
@@ -20,14 +20,14 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// An empty box; joined with another box it gives the other.
+    /// An empty box. Joined with another box it gives the other.
     pub const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
     pub fn around(center: Vec3, reach: f32) -> Self {
         Self { low: center - reach, high: center + reach }
     }
 
-    /// The smallest box that contains both. A box that is not finite is empty.
+    /// The smallest box that contains both. A box that is not finite counts as empty.
     pub fn join(self, other: Self) -> Self {
         if !(other.low.is_finite() && other.high.is_finite()) {
             return self;
@@ -50,22 +50,22 @@ impl Bounds {
         std::array::from_fn(|k| Vec3::new(pick(k, 0, 0), pick(k, 1, 1), pick(k, 2, 2)))
     }
 
-    /// Bounds of everything that moves in a world, with a margin, of sensors, and of the anchors of joints.
+    /// Bounds of all movable bodies in a world with a margin, of sensors, and of the anchors of joints.
     pub fn of(world: &World) -> Self {
         Self::at(world, &poses(world), f32::INFINITY)
     }
 
-    /// The same with the bodies at `poses`, without those few that flew off from a scene of this radius (m).
+    /// The same with the bodies at `poses`, without the few bodies that flew away from a scene of this radius (m).
     pub fn at(world: &World, poses: &Poses, radius: f32) -> Self {
         Self::with_margin(world, poses, MARGIN, radius)
     }
 
-    /// The same as [`Self::of`] without a margin: what lies outside on the side of the eye only hides it.
+    /// Like [`Self::of`] without a margin: anything outside, on the side of the eye, only hides the scene.
     pub fn tight(world: &World) -> Self {
         Self::with_margin(world, &poses(world), 0.0, f32::INFINITY)
     }
 
-    /// These bounds as far as they are within `room` of `other` on each side (m), joined with it.
+    /// The part of these bounds within `room` of `other` on each side (m), joined with `other`.
     pub(crate) fn near(self, other: Self, room: f32) -> Self {
         let kept = Self { low: self.low.max(other.low - room), high: self.high.min(other.high + room) };
         if kept.low.cmple(kept.high).all() { kept.join(other) } else { other }
@@ -91,7 +91,7 @@ impl Bounds {
     }
 }
 
-/// Empties the boxes that are further than `far` from the middle one (m), where these are few.
+/// Empties the boxes that are further than `far` from the median box (m), if there are few of them.
 fn leave_out_gone(boxes: &mut [Bounds], far: f32) {
     let mut centers: Vec<Vec3> = boxes.iter().filter(|b| b.low.is_finite()).map(Bounds::center).collect();
     let (half, few) = (centers.len() / 2, centers.len() / GONE);
@@ -113,7 +113,7 @@ mod tests {
     use super::*;
     use drystone::{Body, Joint, Shape};
 
-    /// A row of `count` cubes, 1 m apart, the last of them `away` (m) from its place and on a rope to its place.
+    /// A row of `count` cubes, 1 m apart. The last one is `away` (m) from its place, and a rope ties it to its place.
     fn row(count: usize, away: f32) -> World {
         let mut world = World::new();
         for i in 0..count {

@@ -9,19 +9,19 @@ use crate::bounds::Bounds;
 /// Vertical angle of view (rad).
 const FIELD: f32 = 0.6;
 
-/// `distance` is that of the eye from `target` (m); `up` is a unit vector.
+/// `distance` is the distance of the eye from `target` (m); `up` is a unit vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     pub target: Vec3,
     pub distance: f32,
-    /// Angle around the upward axis and elevation (rad); at 0 the camera looks along -z if up is y.
+    /// Angle around the upward axis, and elevation (rad). At 0 the camera looks along -z if up is y.
     pub yaw: f32,
     pub pitch: f32,
     pub up: Vec3,
 }
 
 impl Camera {
-    /// A camera for which `bounds` fill a picture of width `aspect` times its height.
+    /// A camera that fits `bounds` into a picture of width `aspect` times its height.
     pub fn framing(bounds: &Bounds, up: Vec3, yaw: f32, pitch: f32, aspect: f32) -> Self {
         let mut camera = Self { target: bounds.center(), distance: bounds.radius(), yaw, pitch, up };
         if !bounds.low.is_finite() {
@@ -30,7 +30,8 @@ impl Camera {
         let slope_y = (0.5 * FIELD).tan();
         let slope_x = slope_y * aspect;
         let [right, above, back] = camera.axes();
-        // Every corner requires a distance for the wider of its two sides; the target moves until opposite margins are equal.
+        // Every corner requires a distance, for the wider of its two sides. Move the target until opposite margins are
+        // equal.
         for _ in 0..8 {
             let seen = |corner: Vec3| {
                 let r = corner - camera.target;
@@ -61,7 +62,7 @@ impl Camera {
         self.target + self.distance * self.axes()[2]
     }
 
-    /// The projection from the world to the picture; `reach` is the radius of the scene around the target (m).
+    /// The projection from the world to the picture. `reach` is the radius of the scene around the target (m).
     pub fn projection(&self, aspect: f32, reach: f32) -> Mat4 {
         let far = self.distance + 60.0 * reach;
         let near = (self.distance - reach).max(0.01 * self.distance);
@@ -69,7 +70,8 @@ impl Camera {
         directx::perspective(FIELD, aspect, near, far) * look_at_mat4(eye, self.target, self.axes()[1])
     }
 
-    /// Origin and unit direction of the ray through a place of the picture, -1 to 1 from left to right and from bottom to top.
+    /// Origin and unit direction of the ray through a place of the picture, -1 to 1 from left to right and from bottom
+    /// to top.
     pub fn ray(&self, at: Vec2, aspect: f32) -> (Vec3, Vec3) {
         let slope = (0.5 * FIELD).tan();
         let [right, above, back] = self.axes();

@@ -1,4 +1,4 @@
-//! Pictures without a window: the renderer draws into a texture, which is read back.
+//! Pictures without a window: the renderer draws into a texture and reads it back.
 
 use crate::pipeline::{Quality, texture};
 use crate::renderer::{Renderer, Shot};
@@ -13,7 +13,7 @@ pub struct Picture {
     pub rgba: Vec<u8>,
 }
 
-/// A texture that pictures are drawn to and read back from. A browser reads none back.
+/// A texture for drawing and reading back pictures. Not available in a browser.
 pub struct Canvas {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -38,7 +38,7 @@ impl Canvas {
     /// The same on an open device.
     ///
     /// # Errors
-    /// It cannot draw pictures of this size.
+    /// The device cannot draw pictures of this size.
     pub fn on(device: wgpu::Device, queue: wgpu::Queue, world: &World, (width, height): (u32, u32)) -> Result<Self> {
         let most = device.limits().max_texture_dimension_2d;
         if width == 0 || height == 0 || width > most || height > most {

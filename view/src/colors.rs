@@ -27,7 +27,7 @@ impl ColorBy {
     /// All, in their order.
     pub const ALL: [Self; 6] = [Self::Material, Self::Batch, Self::Speed, Self::Impulse, Self::Sleeping, Self::Effort];
 
-    /// Its name on command lines, in addresses and in messages.
+    /// Its name in command lines, links and messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Material => "material",
@@ -39,7 +39,7 @@ impl ColorBy {
         }
     }
 
-    /// The one after it; the first after the last.
+    /// The next one; the first one after the last.
     pub fn next(self) -> Self {
         Self::ALL[(self as usize + 1) % Self::ALL.len()]
     }
@@ -80,16 +80,16 @@ const MATERIALS: [Rgba; 8] = [
     [206, 134, 70, 255],
 ];
 
-/// A scale from dark to light for the color-blind too.
+/// A scale from dark to light that is also suitable for the color-blind.
 const SCALE: [[f32; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
-/// Substeps that are doubled this often have the lightest shade.
+/// The number of doublings of substeps with the lightest shade.
 const MOST_DOUBLED: f32 = 6.0;
 
 impl ColorBy {
-    /// A value for each body: number of the material, number of the batch, speed (m/s), impulse (N s), 1 for sleep, or how often the substeps
-    /// are doubled; NaN without a contact.
+    /// A value for each body: number of the material, number of the batch, speed (m/s), impulse (N s), 1 for sleep, or
+    /// the number of times that the substeps are doubled; NaN without a contact.
     pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {
         if self == Self::Effort {
             let doubled = |body| (simulation.substeps_of(body) / simulation.config().substeps).ilog2() as f32;
@@ -130,7 +130,7 @@ impl ColorBy {
         }
     }
 
-    /// The value at the light end of the scale: one in fifty dynamic bodies exceeds it.
+    /// The value at the light end of the scale. One in fifty dynamic bodies exceeds it.
     pub fn scale(self, world: &World, values: &[f32]) -> f32 {
         let dynamic = world.bodies.iter().zip(values).filter(|(b, v)| b.kind == BodyKind::Dynamic && v.is_finite());
         let mut sorted: Vec<f32> = dynamic.map(|(_, v)| *v).collect();

@@ -1,23 +1,23 @@
-//! The camera of a show that runs.
+//! The camera of a running show.
 
 use glam::Vec2;
 
 use crate::camera::Camera;
 use crate::show::Show;
 
-/// A camera that follows what moves in a show, until somebody moves it.
+/// A camera that follows the movable bodies of a show until the user moves it.
 pub struct Eye {
     pub camera: Camera,
     is_by_hand: bool,
 }
 
 impl Eye {
-    /// An eye that sees all of `show` in a picture of width `aspect` times its height.
+    /// An eye that shows all of `show` in a picture of width `aspect` times its height.
     pub fn new(show: &dyn Show, aspect: f32) -> Self {
         Self { camera: show.camera(aspect), is_by_hand: false }
     }
 
-    /// Frames what moves beside a panel that covers the right of the picture, `panel` heights wide.
+    /// Frames the movable bodies beside a panel at the right of the picture, `panel` heights wide.
     pub fn follow(&mut self, show: &dyn Show, aspect: f32, panel: f32) {
         if !self.is_by_hand {
             self.camera = show.camera(aspect - panel);
@@ -25,7 +25,7 @@ impl Eye {
         }
     }
 
-    /// Leaves the camera where it is.
+    /// Stops following.
     pub fn stay(&mut self) {
         self.is_by_hand = true;
     }

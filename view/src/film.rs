@@ -19,7 +19,7 @@ pub struct Moment {
     pub time: f64,
     pub poses: Vec<(Vec3, Quat)>,
     pub values: Vec<f32>,
-    /// The world at that time, in a scene whose bodies come and go.
+    /// The world at that time, for a scene with spawners or leaving bodies.
     world: Option<World>,
 }
 
@@ -63,7 +63,7 @@ impl Film {
         &self.frames
     }
 
-    /// The film with `count` of its frames, evenly spaced, with the last one.
+    /// The film with `count` of its frames, evenly spaced, including the last one.
     pub fn thinned(mut self, count: usize) -> Self {
         self.frames = evenly(self.frames.len(), count).map(|i| self.frames[i].clone()).collect();
         self
@@ -99,7 +99,7 @@ impl Film {
     }
 }
 
-/// `count` of the numbers below `all`, evenly spaced, with the last one.
+/// `count` of the numbers below `all`, evenly spaced, including the last one.
 pub fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
     let count = count.min(all);
     (1..=count).map(move |k| (k * all).div_ceil(count) - 1)

@@ -33,7 +33,7 @@ pub(crate) fn camera_of(map: &Map, aspect: f32) -> Camera {
     Camera::framing(&bounds_of(map), Vec3::Y, 0.0, 1.1, aspect)
 }
 
-/// The maze game as it is played.
+/// A maze game for a player.
 pub struct Labyrinth {
     pub game: Game,
     map: Map,
@@ -43,12 +43,12 @@ pub struct Labyrinth {
     held: [bool; 4],
     /// Position of the pointer in the picture while it is held down.
     held_at: Option<Vec2>,
-    /// Whether the board was tilted; the clock waits for it.
+    /// Whether the board was tilted. The clock starts then.
     pub begun: bool,
     owed: f32,
     /// Whether the next advance begins a new game.
     again: bool,
-    /// Shortest time of a game that was won (s).
+    /// Shortest time of a won game (s).
     pub best: Option<f32>,
 }
 
@@ -74,7 +74,7 @@ impl Labyrinth {
         }
     }
 
-    /// Lets the time pass, as [`Show::advance`], and waits for the steps.
+    /// Advances the time, like [`Show::advance`], and waits for the steps.
     pub fn pass(&mut self, seconds: f32) -> Result<()> {
         if self.again {
             self.restart()?;

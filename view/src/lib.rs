@@ -1,8 +1,8 @@
-//! Pictures of drystone's worlds, and worlds that run while they are looked at.
+//! Pictures of drystone's worlds, and interactive worlds.
 //!
-//! [`Renderer`] draws a world with wgpu on any adapter: into a texture that `Canvas` reads back, or by [`Sight`] on a window or a canvas of
-//! a browser. A [`Show`] is a world that runs: [`Live`] a scene or a recording, [`Labyrinth`] the maze game. Windows, panels and files
-//! are the command's.
+//! [`Renderer`] draws a world with wgpu on any adapter: into a texture that `Canvas` reads back, or through [`Sight`]
+//! on a window or a browser canvas. A [`Show`] is a running world: [`Live`] is a scene or a recording, and
+//! [`Labyrinth`] is the maze game. The command has the windows, panels and files.
 
 #![forbid(unsafe_code)]
 
@@ -42,5 +42,5 @@ pub use poses::{Poses, poses};
 pub use renderer::{Renderer, Shades, Shot};
 pub use show::{Key, Passing, Pointer, Show};
 pub use sight::{Frame, Next, Sight};
-/// The version of wgpu whose devices and surfaces this package takes.
+/// The version of wgpu for the devices and surfaces of this package.
 pub use wgpu;

@@ -1,4 +1,4 @@
-//! A scene or a recording that runs while it is looked at.
+//! A scene or a recording that runs interactively.
 
 use std::time::Duration;
 
@@ -18,18 +18,19 @@ use drystone::{
     StepStats,
 };
 
-/// Rate at which a pulled body approaches the pointer (1/s): soft at any stiffness of joints.
+/// Rate at which a pulled body approaches the pointer (1/s). It is soft for joints of any stiffness.
 const PULL: f32 = 10.0;
-/// Longest time of the steps before a picture, unless drawing takes longer.
+/// Longest time for the steps before a picture, unless drawing takes longer.
 const PATIENCE: Duration = Duration::from_millis(30);
-/// Speed of a thrown cube over the radius of the scene (1/s).
+/// Speed of a thrown cube, in radii of the scene per second (1/s).
 const THROW: f32 = 2.0;
 
-/// A scene or a recording that runs while it is looked at: pulled by the pointer, thrown at, kept and taken back.
+/// A scene or a recording that runs interactively. The user can pull bodies, throw cubes, keep a state and go back to
+/// it.
 pub struct Live {
     pub(crate) scene: Scene,
     exact: bool,
-    /// The backend that was asked for.
+    /// The requested backend.
     pub choice: BackendChoice,
     pub simulation: Simulation,
     spawners: Spawners,
@@ -38,37 +39,37 @@ pub struct Live {
     pub paused: bool,
     /// Requested simulated seconds per second.
     pub speed: f32,
-    /// Reached simulated seconds per second, a mean over the last pictures.
+    /// Reached simulated seconds per second, averaged over the last pictures.
     pub reached: f32,
-    /// Pictures per second, a mean over the last pictures.
+    /// Pictures per second, averaged over the last pictures.
     pub pictures: f32,
     /// Steps since the start.
     pub steps: u32,
     /// Statistics of the last step.
     pub stats: StepStats,
-    /// Times of the stages, means over the last steps (ms).
+    /// Times of the stages, averaged over the last steps (ms).
     pub stage_ms: [f64; 5],
-    /// Why the last change of settings or backend was refused, in one line.
+    /// The error that refused the last change of settings or backend, in one line.
     pub refused: Option<String>,
-    /// What the next advance begins with.
+    /// Orders for the next advance.
     pub(crate) orders: Vec<Order>,
     pub(crate) owed: f32,
-    /// Time of the steps before the last picture.
+    /// Duration of the steps before the last picture.
     pub(crate) stepping: Duration,
     pub(crate) grabbed: Option<Grabbed>,
     pub(crate) kept: Option<Kept>,
-    /// The recording that runs again, instead of the scene.
+    /// The recording that is replayed instead of the scene.
     pub(crate) replay: Option<Replay>,
-    /// Where the pointer is.
+    /// The place of the pointer.
     pub(crate) pointer: Option<Pointer>,
-    /// Of the scene as it began.
+    /// Bounds of the scene at its start.
     pub(crate) built: Bounds,
-    /// Of the bodies, and of the last part of the way that they took.
+    /// Bounds of the bodies and of the last part of their paths.
     pub(crate) way: Bounds,
     pub(crate) light_end: f32,
 }
 
-/// A body that the pointer pulls by a joint of the world.
+/// A body that the pointer pulls through a joint to the world.
 pub(crate) struct Grabbed {
     pub(crate) body: usize,
     /// The pulled point in the body's frame (m).
@@ -79,54 +80,54 @@ pub(crate) struct Grabbed {
     pub(crate) joint: JointHandle,
 }
 
-/// What a key or a button asks for, and the next advance carries out.
+/// A request of a key or a button, for the next advance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
-    /// One step, in a pause.
+    /// One step while paused.
     Step,
     /// The state at the start.
     Restart,
-    /// So many seconds forth or back in a recording.
+    /// Go forward or back in a recording by this time (s).
     Seek(f64),
 }
 
-/// The scene of a recording, whose simulation has begun.
+/// The scene of a recording; `simulation` is its replay.
 pub fn scene_of(replay: &Replay, simulation: &Simulation) -> Scene {
     let mut scene = Scene::new(replay.title(), simulation.world.clone(), replay.len());
     scene.dt = replay.dt().unwrap_or(scene.dt);
-    // A recording has no container; near walls hide its bodies all the same.
+    // A recording has no container, but near walls hide its bodies too.
     let Bounds { low, high } = Bounds::tight(&scene.world);
     scene.container = low.is_finite().then_some((low, high));
     scene
 }
 
-/// A state to go back to: that of the simulation and of the spawners, and its step.
+/// A state to go back to: of the simulation and the spawners, with its step.
 pub(crate) type Kept = (Snapshot, Spawners, u32);
 
 impl Live {
-    /// A scene on the backend that was asked for; `exact` asks a GPU for the reference's bits.
+    /// A scene on the requested backend; `exact` requests a GPU with the bits of the reference.
     ///
     /// # Errors
-    /// Those of [`choose`], bad settings, or a scene that does not fit in memory.
+    /// Those of [`choose`]; or settings are invalid, or the scene does not fit into memory.
     pub fn new(scene: Scene, config: SolverConfig, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
         let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
         let simulation = Simulation::new(scene.world.clone(), config, backend)?;
         Ok(Self { choice, exact, ..Self::of(scene, simulation, color) })
     }
 
-    /// A scene on `backend`, which a page opens by itself.
+    /// A scene on an open backend. A web page opens it itself.
     ///
     /// # Errors
-    /// Bad settings, or a scene that does not fit in memory.
+    /// Settings are invalid, or the scene does not fit into memory.
     pub fn with(scene: Scene, config: SolverConfig, backend: Box<dyn Backend>, color: ColorBy) -> Result<Self> {
         let simulation = Simulation::new(scene.world.clone(), config, backend)?;
         Ok(Self::of(scene, simulation, color))
     }
 
-    /// A recording that runs again.
+    /// A recording to replay.
     ///
     /// # Errors
-    /// Those of [`choose`], or a damaged recording.
+    /// Those of [`choose`]; or the recording is damaged.
     pub fn of_recording(mut replay: Replay, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
         let mut simulation = replay.begin(Box::new(Cpu::new()))?;
         let scene = scene_of(&replay, &simulation);
@@ -165,12 +166,12 @@ impl Live {
         }
     }
 
-    /// The scene as it began.
+    /// The scene at its start.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The scene as it is now: the world, and the spawners with what is left of them.
+    /// The scene at present: the world, and the remaining spawners.
     pub fn scene_now(&self) -> Scene {
         let (spawners, leaving) = self.spawners.remaining(self.scene.dt);
         let mut world = self.simulation.world.clone();
@@ -180,7 +181,7 @@ impl Live {
         Scene { world, spawners, leaving, ..self.scene.clone() }
     }
 
-    /// Whether a recording runs again.
+    /// Whether this is the replay of a recording.
     pub fn is_recording(&self) -> bool {
         self.replay.is_some()
     }
@@ -190,13 +191,13 @@ impl Live {
         self.steps as f32 * self.scene.dt
     }
 
-    /// Notes what the next advance begins with.
+    /// Adds an order for the next advance.
     pub fn order(&mut self, order: Order) {
         self.paused |= order == Order::Step;
         self.orders.push(order);
     }
 
-    /// Carries out what was noted.
+    /// Carries out the orders.
     async fn obey(&mut self) -> Result<()> {
         for order in std::mem::take(&mut self.orders) {
             match order {
@@ -219,12 +220,12 @@ impl Live {
         Ok(())
     }
 
-    /// Keeps the state, to go back to it.
+    /// Keeps the present state, to go back to it.
     pub fn keep(&mut self) {
         self.kept = Some((self.simulation.snapshot(), self.spawners.clone(), self.steps));
     }
 
-    /// Goes back to the state that was kept.
+    /// Goes back to the kept state.
     pub fn go_back(&mut self) {
         if let Some((snapshot, spawners, steps)) = self.kept.as_ref().filter(|_| self.replay.is_none()) {
             self.simulation.restore(snapshot);
@@ -234,7 +235,7 @@ impl Live {
         }
     }
 
-    /// Goes so many seconds forth or back in a recording.
+    /// Goes forward or back in a recording by `seconds`.
     async fn seek(&mut self, seconds: f64) -> Result<()> {
         if let Some(replay) = &mut self.replay {
             let step = (f64::from(self.steps) + seconds / f64::from(self.scene.dt)).round().max(0.0);
@@ -245,20 +246,20 @@ impl Live {
         Ok(())
     }
 
-    /// Forgets the way that the bodies took: a camera frames them where they are.
+    /// Discards the paths of the bodies. The camera then frames them at their present places.
     pub fn look_anew(&mut self) {
         self.way = Bounds::EMPTY;
         self.look();
     }
 
-    /// Notes where the bodies are.
+    /// Records the places of the bodies.
     fn look(&mut self) {
         let (world, radius) = (&self.simulation.world, self.built.radius());
         let now = Bounds::at(world, &poses(world), radius);
         self.way = self.way.near(now, FAR * radius);
     }
 
-    /// Throws a cube from the eye to where the pointer is.
+    /// Throws a cube from the eye towards the pointer.
     pub fn throw(&mut self) {
         let Some(Pointer { origin, direction, .. }) = self.pointer.filter(|_| self.replay.is_none()) else { return };
         let size = 0.02 * self.built.radius();
@@ -269,9 +270,9 @@ impl Live {
             .insert(cube.position(x, y, z).velocity(THROW * self.built.radius() * direction, Vec3::ZERO));
     }
 
-    /// The dynamic body under the pointer, through other bodies if need be, and how far from the eye (m).
+    /// The dynamic body under the pointer, even behind other bodies, and its distance from the eye (m).
     pub fn body_at(&self, Pointer { origin, direction, .. }: Pointer) -> Option<(f32, usize)> {
-        // A recording goes its own way.
+        // A recording cannot be changed.
         if self.replay.is_some() {
             return None;
         }
@@ -281,7 +282,7 @@ impl Live {
         Some((hit.distance, hit.body.index()))
     }
 
-    /// Takes out the dynamic body under the pointer.
+    /// Removes the dynamic body under the pointer.
     pub fn delete(&mut self) {
         let under = self.pointer.and_then(|pointer| self.body_at(pointer));
         let world = &mut self.simulation.world;
@@ -290,7 +291,7 @@ impl Live {
         }
     }
 
-    /// Goes on with another backend, without its warm memory of the last step.
+    /// Continues on another backend, which lacks the rows of the last step.
     ///
     /// # Errors
     /// Those of [`choose`].
@@ -301,10 +302,10 @@ impl Live {
         Ok(())
     }
 
-    /// Lets the time pass at the speed that was asked for, with as many steps as the time allows between two pictures.
+    /// Advances the time at the requested speed, with as many steps as the time between two pictures allows.
     ///
     /// # Errors
-    /// As [`Simulation::step`].
+    /// Those of [`Simulation::step`].
     pub async fn advance_async(&mut self, seconds: f32) -> Result<()> {
         let began = Instant::now();
         self.obey().await?;
@@ -326,10 +327,10 @@ impl Live {
         Ok(())
     }
 
-    /// Makes one step. A page awaits it; elsewhere it ends before the first wait.
+    /// Makes one step. A web page awaits it; elsewhere it completes before the first await.
     ///
     /// # Errors
-    /// As [`Simulation::step`].
+    /// Those of [`Simulation::step`].
     pub async fn step_async(&mut self) -> Result<()> {
         let stats = match &mut self.replay {
             Some(replay) => replay.step_async(&mut self.simulation).await?,
@@ -342,7 +343,7 @@ impl Live {
         Ok(())
     }
 
-    /// Notes a step that was made; a recording without another one stops.
+    /// Records a completed step. A recording stops after its last step.
     fn note(&mut self, stats: Option<StepStats>) {
         match stats {
             Some(stats) => self.after_step(stats),
@@ -350,12 +351,12 @@ impl Live {
         }
     }
 
-    /// Lets bodies come and go and pulls the body that was taken, before a step that the caller makes.
+    /// Runs the spawners and pulls the grabbed body, before a step that the caller makes.
     pub fn before_step(&mut self) {
         let dt = self.scene.dt;
         self.spawners.before_step(&mut self.simulation.world, dt);
         let world = &mut self.simulation.world;
-        // A body that went took its joint along.
+        // When a body is removed, its joint is gone too.
         self.grabbed = self.grabbed.take().filter(|grabbed| world.joint(grabbed.joint).is_some());
         if let Some(grabbed) = &self.grabbed {
             let body = &world.bodies[grabbed.body];
@@ -367,7 +368,7 @@ impl Live {
         }
     }
 
-    /// Notes a step that was made.
+    /// Records a completed step.
     pub fn after_step(&mut self, stats: StepStats) {
         self.stats = stats;
         self.steps += 1;
@@ -399,7 +400,7 @@ mod tests {
         pollster::block_on(live.step_async()).expect("a step");
     }
 
-    /// A key, and the time in which it is obeyed.
+    /// Presses a key, and lets time pass until the key takes effect.
     fn press(live: &mut Live, key: &str) {
         live.key(Key::named(key).expect("a key"), true);
         advance(live, 0.0);
@@ -526,7 +527,7 @@ mod tests {
             .collect();
         let replay = Replay::read(&recorder.finish().expect("memory")).expect("a recording");
         let mut live = Live::of_recording(replay, BackendChoice::Reference, false, ColorBy::Batch).expect("a scene");
-        // Whatever stands before the bodies is not drawn.
+        // Anything in front of the bodies is not drawn.
         let Bounds { low, high } = live.container().expect("bodies");
         let is_inside = |at: Vec3| at.cmpgt(low).all() && at.cmplt(high).all();
         assert!(live.world().dynamic().all(|body| is_inside(body.position)));

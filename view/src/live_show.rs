@@ -1,4 +1,4 @@
-//! Picture, keys and pointer of a live scene.
+//! Pictures, keys and pointer of a live scene.
 
 use glam::Vec3;
 

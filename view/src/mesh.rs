@@ -1,4 +1,4 @@
-//! Meshes of a world: one for all colliders of one geometry, with an instance for each collider.
+//! Meshes of a world: one for all colliders with the same geometry, and an instance for each collider.
 
 use std::ops::Range;
 
@@ -34,17 +34,17 @@ const CHECKERED: u32 = 1;
 const OCTANTS: u32 = 2;
 const SENSOR: u32 = 3;
 
-/// What is seen of a sensor lets the bodies in it be seen too.
+/// Sensors are transparent, so that bodies in them stay visible.
 const SENSOR_COLOR: [u8; 4] = [40, 110, 220, 255];
 
 /// Cosine of the largest angle between faces of a smooth surface, 35 degrees.
 const SMOOTH: f32 = 0.82;
 
-/// What half-spaces look like: squares around `middle` of half side `reach` (m).
+/// The appearance of half-spaces: squares around `middle` with half side `reach` (m).
 pub struct Ground {
     pub middle: Vec3,
     pub reach: f32,
-    /// The color of half-spaces that are fixed.
+    /// The color of fixed half-spaces.
     pub color: [u8; 4],
     /// The color of other fixed bodies.
     pub fixed: [u8; 4],
@@ -60,7 +60,7 @@ struct Part {
     plane: Option<Vec3>,
     /// Whether the body is fixed.
     is_fixed: bool,
-    /// A collider of a body that is not dynamic; it can hide dynamic bodies.
+    /// A collider of a body that is not dynamic. It can hide dynamic bodies.
     screen: Option<Collider>,
 }
 
@@ -75,7 +75,7 @@ pub struct Meshes {
 }
 
 impl Meshes {
-    /// Meshes for the bodies of `world`, whose shapes must not change.
+    /// Meshes for the bodies of `world`. Their shapes must not change.
     pub fn new(world: &World) -> Self {
         let mut meshes = Self { vertices: Vec::new(), groups: Vec::new() };
         let mut known: Vec<Shape> = Vec::new();
@@ -99,7 +99,7 @@ impl Meshes {
                 let (position, rotation) = (collider.position, collider.rotation);
                 let is_fixed = body.kind == BodyKind::Fixed;
                 let part = Part { body: i, position, rotation, scale, pattern, plane, is_fixed, screen };
-                // Bodies of one shape often follow each other: the search begins at the end.
+                // Consecutive bodies often have the same shape, so the search begins at the end.
                 match known.iter().rposition(|k| k.is_same(shape)) {
                     Some(group) => meshes.groups[group].parts.push(part),
                     None => {
@@ -124,7 +124,8 @@ impl Meshes {
         })
     }
 
-    /// An instance for each collider, in the order of [`Meshes::draws`]. Colliders of bodies that are not dynamic vanish if their bounds are `hidden`.
+    /// An instance for each collider, in the order of [`Meshes::draws`]. A collider of a body that is not dynamic is
+    /// left out if its bounds are `hidden`.
     pub fn instances(
         &self,
         poses: &Poses,
@@ -163,7 +164,7 @@ impl Meshes {
     }
 }
 
-/// Corners of the triangles with normals, which are smooth over round surfaces and flat at edges.
+/// Corners of the triangles with normals: smooth over round surfaces, and flat at edges.
 fn corners((vertices, triangles): &Triangles) -> Vec<Vertex> {
     let normal = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| vertices[i as usize]);
@@ -193,7 +194,7 @@ mod tests {
         let scene = Scene::find("pile", &["n=64".into()]).expect("a scene");
         let meshes = Meshes::new(&scene.world);
         let draws: Vec<_> = meshes.draws().collect();
-        // Floor, four walls and all boxes are one mesh of twelve triangles.
+        // Floor, four walls and all boxes share one mesh of twelve triangles.
         assert_eq!(draws, [(0..36, 0..69)]);
     }
 
@@ -216,7 +217,7 @@ mod tests {
             let worst = corners.iter().map(|v| Vec3::from_array(v.normal).angle_between(Vec3::from_array(v.position)));
             worst.fold(0.0, f32::max)
         };
-        // The corners of flat facets would differ by 0.1.
+        // With flat facets, the corners would differ by 0.1.
         let ball = off(&Shape::ball(1.0));
         assert!(ball < 0.05, "{ball}");
         assert!((off(&Shape::cuboid(1.0, 1.0, 1.0)) - (1.0_f32 / 3.0).sqrt().acos()).abs() < 1e-3);

@@ -28,8 +28,8 @@ const JOINT: Rgba = [30, 90, 200, 255];
 const GAP: Rgba = [220, 30, 30, 255];
 const BOX: Rgba = [90, 90, 90, 255];
 
-/// Lines between the anchors of joints that hold a distance, and from bodies to anchors in the world that lie outside of them, as pairs of
-/// ends.
+/// Lines between the anchors of joints that restrict a distance, and from bodies to anchors in the world outside them,
+/// as pairs of ends.
 pub fn ropes(world: &World, poses: &Poses) -> Vec<LineEnd> {
     let line = |ends: [Vec3; 2]| Some(ends.map(|p| LineEnd { position: p.to_array(), color: BOX }));
     let rope = |j: &Joint| {
@@ -82,7 +82,7 @@ pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<Li
             for collider in &body.colliders {
                 let (low, high) = collider.bounds(body.position, body.rotation);
                 let corners = Bounds { low, high }.corners();
-                // Corners with numbers that differ in one bit share an edge.
+                // Corners whose numbers differ in one bit share an edge.
                 let edges = (0..8).flat_map(|k| [1, 2, 4].map(|bit| (k, k | bit))).filter(|(k, n)| k != n);
                 edges.for_each(|(k, n)| line(corners[k], corners[n], BOX));
             }

@@ -1,12 +1,12 @@
 //! Textures, bindings and pipelines of the renderer.
 
-/// How finely pictures are drawn.
+/// The quality of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quality {
     /// Samples per pixel, 1 or 4.
     pub(crate) samples: u32,
     pub(crate) shadow_size: u32,
-    /// Texels of the shadow map that are compared on each side of a point.
+    /// Number of texels of the shadow map that are compared on each side of a point.
     pub(crate) shadow_reach: u32,
 }
 
@@ -16,7 +16,7 @@ impl Quality {
     /// For windows on a software adapter.
     pub const FAST: Self = Self { samples: 1, shadow_size: 1024, shadow_reach: 0 };
 
-    /// What the adapter draws in time.
+    /// The quality that the adapter can draw in time.
     pub fn of(adapter: &wgpu::Adapter) -> Self {
         if adapter.get_info().device_type == wgpu::DeviceType::Cpu { Self::FAST } else { Self::FINE }
     }

@@ -1,4 +1,5 @@
-//! Draws the bodies of a world with wgpu on any adapter: an instanced draw for each mesh, a shadow map, lines on top.
+//! Draws the bodies of a world with wgpu on any adapter: an instanced draw for each mesh, a shadow map, and lines on
+//! top.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -14,25 +15,25 @@ use crate::pipeline::{DEPTH, Drawing, Quality, bind, cleared_depth, layout_of, p
 use crate::poses::Poses;
 use drystone::{BodyHandle, World};
 
-/// The colors of what is no body that moves.
+/// The colors of the background and of fixed bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shades {
     /// Behind all bodies; the ground fades into it (sRGB, 0 to 1).
     pub background: [f32; 3],
-    /// The ground: half-spaces that are fixed.
+    /// The ground: fixed half-spaces.
     pub ground: Rgba,
     /// Other fixed bodies.
     pub fixed: Rgba,
 }
 
 impl Shades {
-    /// Dark bodies before a light background.
+    /// Dark bodies in front of a light background.
     pub const LIGHT: Self = Self { background: [0.93, 0.94, 0.96], ground: FIXED, fixed: FIXED };
-    /// Light bodies before a dark background.
+    /// Light bodies in front of a dark background.
     pub const DARK: Self =
         Self { background: [0.075, 0.085, 0.105], ground: [62, 66, 74, 255], fixed: [92, 97, 107, 255] };
 
-    /// A background of the caller with the ground of the light or the dark shades.
+    /// A background color of the caller, with the ground of the light or the dark shades.
     pub fn before(background: [f32; 3]) -> Self {
         let is_dark = background.iter().sum::<f32>() < 1.5;
         Self { background, ..if is_dark { Self::DARK } else { Self::LIGHT } }
@@ -50,7 +51,7 @@ pub struct Shot<'a> {
     pub lines: &'a [LineEnd],
 }
 
-/// As `View` in shaders/view.wgsl.
+/// Twin of `View` in shaders/view.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct View {
@@ -68,7 +69,7 @@ pub struct Renderer {
     device: wgpu::Device,
     queue: wgpu::Queue,
     meshes: Meshes,
-    /// The bodies that the meshes are of.
+    /// The bodies of the present meshes.
     drawn: Vec<BodyHandle>,
     vertices: wgpu::Buffer,
     view: wgpu::Buffer,
@@ -80,7 +81,7 @@ pub struct Renderer {
     lines: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
     quality: Quality,
-    /// Textures of the size of the picture: depth, and color with several samples.
+    /// Textures with the size of the picture: depth, and color with several samples.
     targets: Option<Targets>,
 }
 
@@ -128,7 +129,7 @@ impl Renderer {
             wgpu::BindingResource::TextureView(&shadow_map),
             wgpu::BindingResource::Sampler(&sampler),
         ];
-        // The shadow pass writes the map and therefore must not bind it.
+        // The shadow pass writes the map and must not bind it.
         let (shadow_layout, shadow_group) = bind(device, &[uniform], &resources[..1]);
         let (main_layout, main_group) = bind(device, &[uniform, depth_texture, comparison], &resources);
 
@@ -174,14 +175,14 @@ impl Renderer {
         }
     }
 
-    /// Takes over bodies that came or went since the last picture.
+    /// Updates the meshes after bodies were added or removed since the last picture.
     pub fn follow(&mut self, world: &World) {
         if !world.bodies.handles().eq(self.drawn.iter().copied()) {
             self.replace(world);
         }
     }
 
-    /// Takes over the bodies of another world, or of one in which shapes changed.
+    /// Replaces the meshes, for another world or after shapes changed.
     pub fn replace(&mut self, world: &World) {
         self.meshes = Meshes::new(world);
         self.drawn = world.bodies.handles().collect();
@@ -243,7 +244,7 @@ impl Renderer {
                 ..Default::default()
             });
             draw_bodies(&mut pass, &self.bodies, &self.main_group);
-            // A browser warns of a draw of nothing.
+            // A browser warns about an empty draw.
             if !shot.lines.is_empty() {
                 pass.set_pipeline(&self.lines);
                 pass.set_bind_group(0, &self.shadow_group, &[]);
@@ -276,8 +277,8 @@ impl Renderer {
     }
 }
 
-/// Whether a body is a near wall of `container`: it lies outside on the side of the eye and covers more than half of both lengths of
-/// this side.
+/// Whether a body is a near wall of `container`: it lies outside, on the side of the eye, and covers more than half of
+/// both lengths of this side.
 fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
     let slack = 1e-3 * container.radius();
     let covered = b.high.min(container.high) - b.low.max(container.low);
@@ -289,7 +290,7 @@ fn stands_before(b: &Bounds, container: &Bounds, eye: Vec3) -> bool {
     })
 }
 
-/// A buffer of vertices or instances. It is not mapped when it is made: in a browser that fails where the device is lost.
+/// A buffer of vertices or instances. It is not mapped at creation: in a browser that fails if the device is lost.
 fn vertex_buffer(device: &wgpu::Device, queue: &wgpu::Queue, contents: &[u8]) -> wgpu::Buffer {
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("vertices"),

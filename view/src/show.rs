@@ -1,4 +1,4 @@
-//! A world that runs and is looked at: what a window or a page asks of it.
+//! A running world, in the form that a window or a page uses.
 
 use std::pin::Pin;
 
@@ -10,7 +10,7 @@ use crate::camera::Camera;
 use crate::colors::Rgba;
 use crate::overlay::LineEnd;
 
-/// Where a mouse or a finger points.
+/// The place under a mouse or a finger.
 #[derive(Clone, Copy, Debug)]
 pub struct Pointer {
     /// Position in the picture, -1 to 1 from left to right and from bottom to top.
@@ -22,14 +22,14 @@ pub struct Pointer {
 }
 
 impl Pointer {
-    /// A pointer at a place of the picture that `camera` takes, -1 to 1, in a picture of width `aspect` times its height.
+    /// A pointer at a place of the picture of `camera`, -1 to 1, in a picture of width `aspect` times its height.
     pub fn through(camera: &Camera, at: Vec2, aspect: f32) -> Self {
         let (origin, direction) = camera.ray(at, aspect);
         Self { at, origin, direction }
     }
 }
 
-/// A key that a show can understand.
+/// A key that a show can handle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
     /// A letter in lower case, a digit, a sign, or a space.
@@ -42,7 +42,7 @@ pub enum Key {
 }
 
 impl Key {
-    /// The key of a name in the standard for keyboard events (`KeyboardEvent.key`); none if no show has a use for it.
+    /// The key with a name of the standard for keyboard events (`KeyboardEvent.key`), or `None` if no show uses it.
     pub fn named(name: &str) -> Option<Self> {
         let mut characters = name.chars();
         match (name, characters.next(), characters.next()) {
@@ -51,20 +51,20 @@ impl Key {
             ("ArrowRight", ..) => Some(Self::Right),
             ("ArrowUp", ..) => Some(Self::Up),
             ("ArrowDown", ..) => Some(Self::Down),
-            // Keys are independent of shift and caps lock.
+            // Keys are independent of Shift and Caps Lock.
             (_, Some(character), None) => Some(Self::Character(character.to_lowercase().next().unwrap_or(character))),
             _ => None,
         }
     }
 }
 
-/// Time that passes in a show. A page awaits it, since a page cannot wait for a device; other programs block on it.
+/// The future of an advance. A page awaits it, since it cannot block; other programs block on it.
 pub type Passing<'a> = Pin<Box<dyn Future<Output = Result<()>> + 'a>>;
 
-/// A world that runs, and how it is looked at. Nothing but [`Show::advance`] makes a step.
+/// A running world and its view. Only [`Show::advance`] makes steps.
 pub trait Show {
     fn title(&self) -> String;
-    /// The world. Bodies may come and go; the shapes of a body must not change.
+    /// The world. Bodies can be added and removed; the shapes of a body must not change.
     fn world(&self) -> &World;
     /// Bounds of the bodies that cast shadows.
     fn bounds(&self) -> Bounds;
@@ -72,19 +72,19 @@ pub trait Show {
     fn container(&self) -> Option<Bounds> {
         None
     }
-    /// The first camera, in a picture of width `aspect` times its height.
+    /// The first camera, for a picture of width `aspect` times its height.
     fn camera(&self, aspect: f32) -> Camera;
     fn colors(&mut self) -> Vec<Rgba>;
     fn lines(&mut self) -> Vec<LineEnd> {
         Vec::new()
     }
-    /// Carries out what keys asked for, and lets the time pass.
+    /// Carries out the orders of keys, and advances the time.
     fn advance(&mut self, seconds: f32) -> Passing<'_>;
-    /// Notes where the pointer is, before a key.
+    /// Sets the place of the pointer, before a key.
     fn point(&mut self, _pointer: &Pointer) {}
-    /// Notes a key; the next [`Show::advance`] makes the steps that it asks for.
+    /// Handles a key. The next [`Show::advance`] makes the steps that it requests.
     fn key(&mut self, key: Key, down: bool);
-    /// Handles the press of a button or a finger; returns whether drags go here instead of to the camera.
+    /// Handles the press of a button or a finger. Returns whether drags go to the show instead of the camera.
     fn grab(&mut self, pointer: &Pointer) -> bool;
     fn drag(&mut self, pointer: &Pointer);
     fn release(&mut self);

@@ -1,4 +1,4 @@
-//! A surface that shows are drawn on: a window, or a canvas of a browser.
+//! A surface for shows: a window, or a browser canvas.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +11,7 @@ use crate::poses::poses;
 use crate::renderer::{Renderer, Shot};
 use crate::show::Show;
 
-/// A surface with the device and the renderer that draw on it.
+/// A surface with its device and renderer.
 pub struct Sight {
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -25,13 +25,13 @@ pub struct Sight {
 /// The next picture of a surface.
 pub enum Next {
     Frame(Frame),
-    /// The surface is hidden, late, or was lost and is configured anew: a later picture may succeed.
+    /// The surface is hidden or late, or was lost and is configured again: a later picture can succeed.
     Later,
-    /// The surface is gone, as a window that another program closed.
+    /// The surface is gone, like a window that another program closed.
     Gone,
 }
 
-/// A picture that is not shown yet.
+/// A picture that is not presented yet.
 pub struct Frame {
     texture: wgpu::SurfaceTexture,
     pub view: wgpu::TextureView,
@@ -52,11 +52,12 @@ impl Sight {
         Self::of(surface, &adapter, device, queue, size)
     }
 
-    /// A canvas of a browser, of width and height `size` (pixels of the device): by WebGPU, and by WebGL2 (feature `webgl`) where
-    /// the browser has no WebGPU or `webgpu` is false. A canvas that WebGPU drew on gives no WebGL2 any more: that takes another canvas.
+    /// A browser canvas of width and height `size` (device pixels). It uses WebGPU, or WebGL2 (feature `webgl`) if the
+    /// browser has no WebGPU or `webgpu` is false. A canvas that was used for WebGPU no longer supports WebGL2: pass
+    /// another canvas.
     ///
     /// # Errors
-    /// The browser draws by neither.
+    /// The browser supports neither.
     #[cfg(target_family = "wasm")]
     pub async fn on_canvas(canvas: wgpu::SurfaceTarget<'static>, size: (u32, u32), webgpu: bool) -> Result<Self> {
         let neither = |e: &dyn std::fmt::Display| {
@@ -76,7 +77,7 @@ impl Sight {
         let surface = instance.create_surface(canvas).map_err(|e| neither(&e))?;
         let options = wgpu::RequestAdapterOptions { compatible_surface: Some(&surface), ..Default::default() };
         let adapter = instance.request_adapter(&options).await.map_err(|e| neither(&e))?;
-        // The renderer needs no more than WebGL2 has, but for the size of the canvas.
+        // The renderer needs no more than WebGL2 has, except for the size of the canvas.
         let required_limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(adapter.limits());
         let descriptor = wgpu::DeviceDescriptor { label: Some("drystone"), required_limits, ..Default::default() };
         let (device, queue) = adapter.request_device(&descriptor).await.map_err(|e| neither(&e))?;
@@ -112,17 +113,17 @@ impl Sight {
         &self.queue
     }
 
-    /// The format of the pictures, which is not an sRGB format.
+    /// The format of the pictures; it is not an sRGB format.
     pub fn format(&self) -> wgpu::TextureFormat {
         self.config.format
     }
 
-    /// What draws: Vulkan, Metal, Direct3D, OpenGL (in a browser WebGL2), or WebGPU.
+    /// The graphics API: Vulkan, Metal, Direct3D, OpenGL (WebGL2 in a browser), or WebGPU.
     pub fn api(&self) -> wgpu::Backend {
         self.api
     }
 
-    /// Whether the device is lost: nothing is drawn from now on, and another sight has to be opened.
+    /// Whether the device is lost. Then nothing more is drawn, and another sight has to be opened.
     pub fn is_lost(&self) -> bool {
         self.is_lost.load(Ordering::Relaxed)
     }
@@ -132,19 +133,20 @@ impl Sight {
         (self.config.width, self.config.height)
     }
 
-    /// Width over height.
+    /// Width divided by height.
     pub fn aspect(&self) -> f32 {
         self.config.width as f32 / self.config.height as f32
     }
 
-    /// Gives the pictures another width and height (pixels), the adapter's largest at most; returns whether the surface still exists.
+    /// Changes width and height of the pictures (pixels), up to the limit of the adapter. Returns whether the surface
+    /// still exists.
     pub fn resize(&mut self, (width, height): (u32, u32)) -> bool {
         let most = self.device.limits().max_texture_dimension_2d;
         (self.config.width, self.config.height) = (width.clamp(1, most), height.clamp(1, most));
         self.configure()
     }
 
-    /// Configures the surface; returns whether it still exists.
+    /// Configures the surface. Returns whether it still exists.
     #[cfg(not(target_family = "wasm"))]
     fn configure(&self) -> bool {
         let refused = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
@@ -172,7 +174,7 @@ impl Sight {
         }
     }
 
-    /// Draws a show, as `camera` sees it. Before the first picture of another show, [`Renderer::replace`] takes over its world.
+    /// Draws a show from `camera`. Before the first picture of another show, call [`Renderer::replace`] with its world.
     pub fn paint(&mut self, frame: &Frame, show: &mut dyn Show, camera: &Camera) {
         let (colors, lines) = (show.colors(), show.lines());
         let poses = poses(show.world());
@@ -182,7 +184,7 @@ impl Sight {
         self.renderer.draw(&frame.view, (self.config.width, self.config.height), &shot);
     }
 
-    /// Shows a picture.
+    /// Presents a picture.
     pub fn present(&self, frame: Frame) {
         self.queue.present(frame.texture);
     }

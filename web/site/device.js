@@ -1,13 +1,13 @@
-// Measures how fast this device steps a pile, and keeps the size of the pile that it bears.
+// Measures how fast this device steps a pile, and stores the size of the largest pile in real time.
 import { Bare } from "./drystone_web.js";
 
 const KEY = "drystone.device.1";
-/// Boxes of the pile that is measured, steps until it is dense, and steps that are timed.
+/// Boxes of the measured pile, steps until it is dense, and timed steps.
 const [BOXES, BEFORE, TIMED] = [100, 25, 15];
-/// Time that a step may take, of the 16.7 ms between two pictures (ms).
+/// Time for a step, out of the 16.7 ms between two pictures (ms).
 const WANTED = 7;
 
-/// What was measured before; null before the first visit, or where the browser keeps nothing.
+/// The last measurement; null before the first visit, or if the browser stores nothing.
 export function known() {
   try {
     const device = JSON.parse(localStorage.getItem(KEY));
@@ -25,14 +25,14 @@ export async function measure() {
   await pile.steps(TIMED);
   const ms = Math.max((performance.now() - began) / TIMED, 0.01);
   pile.free();
-  // Two digits, so that the number reads well.
+  // Two digits, so that the number is easy to read.
   const boxes = (BOXES * WANTED) / ms;
   const digit = 10 ** Math.max(Math.floor(Math.log10(boxes)) - 1, 0);
   const device = { boxes: Math.min(Math.max(Math.round(boxes / digit) * digit, 20), 4000), ms: (ms * 1000) / BOXES };
   try {
     localStorage.setItem(KEY, JSON.stringify(device));
   } catch {
-    // A browser that keeps nothing measures on every visit.
+    // If the browser stores nothing, every visit measures again.
   }
   return device;
 }

@@ -1,6 +1,6 @@
-// Forms of parameters and settings, made of the descriptions in the library.
+// Forms of parameters and settings, built from the descriptions in the library.
 
-/// A field with its label and description. `changed` gets the value that was chosen.
+/// A field with its label and description. `changed` gets the chosen value.
 export function field({ prefix, name, summary, value, words = [], slider = null, isChanged = false }, changed) {
   const id = `${prefix}-${name.replace(".", "-")}`;
   const parent = document.createElement("div");
@@ -34,7 +34,7 @@ export function field({ prefix, name, summary, value, words = [], slider = null,
   return parent;
 }
 
-/// A number, or the text itself where it is none: the library refuses it by name.
+/// A number, or the text itself if it is not a number: the library then refuses it by name.
 function number(text) {
   const value = Number(text.replace(",", "."));
   return text.trim() === "" || !Number.isFinite(value) ? text : value;
@@ -56,7 +56,8 @@ function range({ least, most, whole, logarithmic }, id, name, value, input, chan
   return slider;
 }
 
-/// The range of a slider for a parameter of the catalogue: four times the default, or all of a wide range in powers of ten.
+/// The range of a slider for a parameter of the catalogue: four times the default, or the whole of a wide range in
+/// powers of ten.
 export function slider({ least, most, whole, default: usual }) {
   const logarithmic = least > 0 && most / least >= 1e4 && !whole;
   const end = logarithmic || usual <= 0 ? most : Math.min(most, 4 * usual);

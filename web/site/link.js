@@ -25,7 +25,7 @@ export function read(hash) {
     else if (key === "exact" && ["true", "false"].includes(value)) found.exact = value === "true";
     else if (key.startsWith("p.")) found.parameters[key.slice(2)] = value;
     else if (key.startsWith("s.")) found.settings[key.slice(2)] = typed(value);
-    else throw new Error(`the link: ${key} = ${value} is not known`);
+    else throw new Error(`the link has an unknown part: ${key} = ${value}`);
   }
   if (found.scene === null && found.maze === null) throw new Error("the link names no scene");
   return found;

@@ -1,4 +1,4 @@
-// The page: its beginning, its controls, and what it offers to tests.
+// The page: its start, its controls, and its interface for tests.
 import start, { Maze, Show, conform, hash_after } from "./drystone_web.js";
 import * as device from "./device.js";
 import * as link from "./link.js";
@@ -57,7 +57,7 @@ function controls() {
   }
   on("exact", "change", ({ target }) => tried(() => open({ ...chosen, exact: target.checked }, file)).then(panel.panel));
   element("backend-note").textContent = hasWebGPU()
-    ? "Both runs the CPU beside WebGPU and names the first number that differs. Exact WebGPU has the bits of the CPU, but is slower."
+    ? "Both runs the scene on the CPU and on WebGPU, and reports the first number that differs. Exact WebGPU has the bits of the CPU, but is slower."
     : "This browser has no WebGPU: everything runs on the CPU.";
   element("conform").hidden = !hasWebGPU();
   on("conform", "click", panel.check);
@@ -79,7 +79,7 @@ function controls() {
   dropping();
 }
 
-/// Opens what a link names, or says why it cannot.
+/// Opens the content of a link, or reports why it cannot.
 async function follow(hash) {
   const found = link.read(hash);
   if (!found) return false;
@@ -87,7 +87,7 @@ async function follow(hash) {
     await open(found);
   } catch (error) {
     if (found.backend === "cpu") throw error;
-    // A device without WebGPU follows the link all the same.
+    // Without WebGPU, the CPU runs the scene of the link.
     await open({ ...found, backend: "cpu" });
     say(`${error.message}. The CPU runs the scene.`, true);
   }
@@ -111,7 +111,7 @@ function shortcut(event) {
   const { key, target } = event;
   if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
   if (target.matches("input:not([type=radio]):not([type=checkbox]), select, textarea")) return;
-  // The keys of buttons are their own.
+  // Keys on a button belong to the button.
   if (key === " " && target.matches("button, summary, input")) return;
   const at = target === element("picture") && element("picture").matches(":focus-visible") ? [0, 0] : pointer;
   const calls = {
@@ -144,7 +144,7 @@ async function begin() {
   try {
     await openPicture();
   } catch (error) {
-    note = `There is no picture: ${error.message}. The numbers are those of the run.`;
+    note = `There is no picture: ${error.message}. The numbers of the run are still shown.`;
   }
   controls();
   hear();
@@ -166,7 +166,7 @@ async function begin() {
   loop();
 }
 
-/// Parameters as an object, of a list of `name=value` or an object.
+/// Converts a list of `name=value` to an object. An object stays as it is.
 const named = (parameters) =>
   Array.isArray(parameters) ? Object.fromEntries(parameters.map((p) => p.split(/=(.*)/s).slice(0, 2))) : { ...parameters };
 
@@ -175,7 +175,7 @@ const ready = begin().catch((error) => {
   throw error;
 });
 
-// For tests and for the console of the browser.
+// For tests and for the browser's console.
 window.drystone = {
   ready,
   state,

@@ -3,13 +3,13 @@ import { list } from "./numbers.js";
 
 const element = (id) => document.getElementById(id);
 const ARROWS = { ArrowLeft: 0, ArrowRight: 1, ArrowUp: 2, ArrowDown: 3 };
-/// Tilt of a phone that tilts the board as far as it goes (degrees).
+/// Tilt of the phone at which the board reaches its largest tilt (degrees).
 const FULL = 25;
 
 export class Tilts {
   held = [false, false, false, false];
   pressed = null;
-  /// How the phone is held as its tilt begins to count, and how it is held now (degrees).
+  /// The tilt of the phone at the start, and its tilt now (degrees).
   level = null;
   now = null;
 
@@ -33,17 +33,17 @@ export class Tilts {
     return [0, 1].map((k) => Math.max(-1, Math.min(1, (this.now[k] - this.level[k]) / FULL)));
   }
 
-  /// Listens to the tilt of the device; a phone of Apple asks its user first.
+  /// Listens to the tilt of the device. An Apple phone first asks its user.
   async follow() {
     const { DeviceOrientationEvent } = window;
     if (typeof DeviceOrientationEvent?.requestPermission === "function") {
       const answer = await DeviceOrientationEvent.requestPermission();
-      if (answer !== "granted") throw new Error("this device does not tell its tilt: the permission was not given");
+      if (answer !== "granted") throw new Error("this device does not report its tilt: the permission was not given");
     }
     this.level = this.now = null;
     addEventListener("deviceorientation", ({ beta, gamma }) => {
       if (beta === null || gamma === null) return;
-      // From the axes of the phone to those of the screen.
+      // Converts from the axes of the phone to those of the screen.
       const turned = { 0: [gamma, beta], 90: [beta, -gamma], 180: [-gamma, -beta], 270: [-beta, gamma] };
       this.now = turned[screen.orientation?.angle ?? 0] ?? [gamma, beta];
       this.level ??= this.now;
@@ -51,12 +51,12 @@ export class Tilts {
   }
 }
 
-/// Whether this device may tell its tilt.
+/// Whether this device can report its tilt.
 export const hasTilt = () => "DeviceOrientationEvent" in window && matchMedia("(pointer: coarse)").matches;
 
 const BEST = "drystone.maze.1.";
 
-/// The best time on a board (s); null if none.
+/// The best time on a board (s); null without one.
 function best(board) {
   try {
     return Number(localStorage.getItem(BEST + board)) || null;
@@ -72,15 +72,15 @@ export function show(state) {
     try {
       localStorage.setItem(BEST + state.board, String(record));
     } catch {
-      // A browser that keeps nothing keeps no record.
+      // A browser that stores nothing keeps no record.
     }
   }
   const said = {
     goal: "Won. Restart plays again.",
     hole: "Lost: the ball fell into a hole. Restart plays again.",
-    time: "The time is over.",
+    time: "Time is up.",
   };
-  const line = said[state.outcome] ?? (state.time > 0 ? "The clock runs." : "The clock starts with the first tilt.");
+  const line = said[state.outcome] ?? (state.time > 0 ? "The clock is running." : "The clock starts with the first tilt.");
   if (element("maze-state").textContent !== line) element("maze-state").textContent = line;
   const degrees = (x) => `${x.toFixed(1)}°`;
   list(element("maze-numbers"), [

@@ -1,7 +1,7 @@
-// Numbers of what runs: a list, the time of a step by stage as a bar, overlap and rest speed as running curves.
+// Numbers of the run: a list, the time of a step by stage as a bar, overlap and rest speed as running curves.
 
 const STAGES = ["detect", "color", "prepare", "run", "store"];
-/// Points of a curve: half a minute at ten a second.
+/// Points of a curve: half a minute at ten points per second.
 const LONGEST = 300;
 const element = (id) => document.getElementById(id);
 
@@ -17,7 +17,7 @@ export function short(x) {
 /// All digits of a number.
 export const plain = (x) => x.toLocaleString("en", { maximumSignificantDigits: 16 });
 
-/// Fills a list of terms; the elements stay, so that a screen reader does not lose its place.
+/// Fills a list of terms. The elements stay, so that a screen reader keeps its place.
 export function list(parent, rows) {
   while (parent.children.length > 2 * rows.length) parent.lastElementChild.remove();
   while (parent.children.length < 2 * rows.length) {
@@ -95,7 +95,7 @@ export function restart() {
   Object.values(curves).forEach((curve) => curve.clear());
 }
 
-/// Shows the numbers of a run; `grows` says whether it made a step since the last call.
+/// Shows the numbers of a run. `grows` is true if the run made a step since the last call.
 export function show(state, grows) {
   const rows = [
     ["bodies", state.asleep > 0 ? `${state.bodies}, ${state.asleep} asleep` : `${state.bodies}`],

@@ -1,4 +1,4 @@
-// What the controls show: the scene with its parameters, the settings, the gallery, and the checks of WebGPU.
+// The contents of the controls: the scene with its parameters, the settings, the gallery, and the checks of WebGPU.
 import { catalogue, conform, settings } from "./drystone_web.js";
 import * as device from "./device.js";
 import * as fields from "./fields.js";
@@ -12,7 +12,7 @@ const MAIN = ["substeps", "iterations", "relax", "friction"];
 export let scenes = [];
 export let described = { presets: [], settings: [] };
 
-/// Reads the descriptions in the library, and shows from now on what runs.
+/// Reads the descriptions in the library, and from then on shows the run.
 export function begin() {
   [scenes, described] = [catalogue(), settings()].map((text) => JSON.parse(text));
   changes.addEventListener("replaced", () => (look(), panel()));
@@ -91,10 +91,10 @@ function parameters() {
   }
 }
 
-/// A line of the library as a sentence; a name of one letter stays.
+/// A line of the library as a sentence. A name of one letter stays lower case.
 const sentence = (text) => `${/^\w\b/.test(text) && text[0] !== "a" ? text[0] : text[0].toUpperCase()}${text.slice(1)}.`;
 
-/// Measures the device and opens a pile of the size that it bears.
+/// Measures the device and opens the largest pile that it steps in real time.
 async function measured() {
   const { boxes } = await device.measure();
   await open({ ...chosen, maze: null, scene: "pile", parameters: { ...chosen.parameters, n: boxes } });
@@ -120,7 +120,7 @@ function solver() {
   element("defaults").disabled = Object.keys(chosen.settings).every((name) => name === "preset");
 }
 
-/// Changes the settings of what runs.
+/// Changes the settings of the run.
 const change = (next) =>
   tried(() => {
     setSettings(next);
@@ -130,7 +130,7 @@ const change = (next) =>
 /// Changes the settings to those of a preset.
 export const choosePreset = (name) => change(name === described.preset ? {} : { preset: name });
 
-/// Checks the WebGPU of this browser, and lists what was found.
+/// Checks the WebGPU of this browser, and lists the results.
 export async function check() {
   const list = element("checks");
   list.replaceChildren();
@@ -172,7 +172,7 @@ export function gallery() {
   element("gallery-dialog").showModal();
 }
 
-/// The parameters that a scene begins with: a pile has the size that the device bears.
+/// The first parameters of a scene. A pile has the size that the device can step in real time.
 export const first = (scene) => (scene === "pile" && device.known() ? { n: device.known().boxes } : {});
 export const choose = (scene) => tried(() => open({ ...chosen, maze: null, scene, parameters: first(scene) })).then(panel);
 

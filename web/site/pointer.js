@@ -1,10 +1,12 @@
-// Mouse, touch and keys on a picture. `act` gets what is done: turn, move, zoom, take, drag, let go, throw, delete, whole, or the press of a maze.
+// Mouse, touch and keys on a picture. `act` gets the actions: turn, move, zoom, take, drag, let go, throw, delete,
+// whole, or the press of a maze.
 
 const TURN = 0.05;
-/// A notch of the wheel brings the camera to 0.9 of its distance. Two fingers bring it as near as they part.
+/// A notch of the wheel moves the camera to 0.9 of its distance. Two fingers move it closer in the ratio of their
+/// distances.
 const NOTCH = Math.log(1 / 0.9);
 
-/// Where an event is in the picture, -1 to 1 from left to right and from bottom to top.
+/// The place of an event in the picture, -1 to 1 from left to right and from bottom to top.
 function place(canvas, { clientX, clientY }) {
   const box = canvas.getBoundingClientRect();
   return [(2 * (clientX - box.left)) / box.width - 1, 1 - (2 * (clientY - box.top)) / box.height];
@@ -34,7 +36,7 @@ export function listen(canvas, act, tool) {
     else if (tool() === "throw") [drag] = [null, act.throw(at)];
     else if (tool() === "delete") [drag] = [null, act.delete(at)];
     else {
-      // The first moves turn nothing until it is known whether there is a body.
+      // Until the first body test is done, moves do not turn the view.
       drag = "asked";
       const taken = await act.grab(at);
       if (drag === "asked") drag = taken ? "body" : "orbit";
@@ -80,7 +82,7 @@ export function listen(canvas, act, tool) {
   );
 }
 
-/// Keys on the picture: arrows turn, move, or pull the body that Enter took in the middle.
+/// Keys on the picture: arrows turn or move the view, or pull the body that Enter grabbed in the middle.
 export function keys(canvas, act) {
   let held = null;
   const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };

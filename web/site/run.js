@@ -1,39 +1,40 @@
-// What runs, and the loop that steps and draws it. Other files read what is exported here; only functions of this file change it.
+// The run, and the loop that steps and draws it. Other files read the exports; only functions of this file change them.
 import { Maze, Picture, Show, first_difference } from "./drystone_web.js";
 import * as link from "./link.js";
 import * as maze from "./maze.js";
 import * as numbers from "./numbers.js";
 
 const element = (id) => document.getElementById(id);
-/// Most steps between two pictures, and the time after which none begins (ms).
+/// Largest number of steps between two pictures, and the time after which no further step begins (ms).
 const [MOST_STEPS, PATIENCE] = [4, 25];
 
-/// Tells `replaced` when something else runs, `differs` at the first number that differs, and `canvases` when other canvases took their places.
+/// Events: `replaced` when something else runs, `differs` at the first number that differs, and `canvases` when
+/// canvases were replaced.
 export const changes = new EventTarget();
-/// What the controls say.
+/// The state of the controls.
 export let chosen = { maze: null, scene: "pile", parameters: {}, settings: {}, backend: "cpu", exact: true };
 /// The bytes and name of the file that runs instead of a scene of the catalogue.
 export let file = null;
-/// What runs: one show, or two beside each other; or a game.
+/// The run: one show, two side by side, or a game.
 export let shows = [];
 export let game = null;
 let pictures = [];
 export let paused = false;
 let owed = 0;
 let last = null;
-/// Where the pointer was last, -1 to 1 from left to right and from bottom to top.
+/// The last place of the pointer, -1 to 1 from left to right and from bottom to top.
 export let pointer = [0, 0];
 /// The first number that differs between two shows.
 export let difference = null;
 let pace = 1;
-/// The width over the height that all of the scene was last shown for, or "by hand".
+/// The aspect ratio for which the whole scene was last shown, or "by hand".
 let framed = null;
 const rates = { steps: 0, pictures: 0 };
 /// Wanted tilts of the board.
 export const tilts = new maze.Tilts();
 tilts.listens = () => game !== null;
 
-// Calls of the solver may wait for a device and must not overlap: each begins when the one before has ended.
+// Calls of the solver can wait for a device and must not overlap: each begins when the one before has ended.
 let line = Promise.resolve();
 let isBusy = false;
 export function enqueue(call) {
@@ -53,18 +54,18 @@ export function say(text, isBad = false) {
   if (!isBad) say.timer = setTimeout(() => (message.textContent = ""), 6000);
 }
 
-/// Shows the line of an error. What runs goes on, unless the solver itself broke.
+/// Shows the line of an error. The run continues, unless the solver itself failed.
 export function refuse(error) {
   if (error instanceof WebAssembly.RuntimeError) {
     pause(true);
     [shows, game] = [[], null];
-    say("The solver has stopped by a mistake of its own. Load the page again to go on.", true);
+    say("The solver stopped because of a defect. Load the page again to continue.", true);
     throw error;
   }
   say(error.message ?? String(error), true);
 }
 
-/// Runs what a control asks for, and says why where it cannot be done.
+/// Does what a control requests, or reports why it cannot be done.
 export const tried = (call) => enqueue(call).then((value) => value, refuse);
 
 export const hasWebGPU = () => pictures[0]?.api() === "WebGPU";
@@ -75,7 +76,7 @@ const aspect = () => {
 export const assignments = (parameters) =>
   Array.isArray(parameters) ? parameters : Object.entries(parameters ?? {}).map(([name, value]) => `${name}=${value}`);
 
-/// Opens what is chosen. Only where all of it can be opened does it replace what runs.
+/// Opens the chosen scene or file. It replaces the present run only if all of it can be opened.
 export async function open(next, nextFile = null) {
   if (next.maze) {
     const opened = new Maze(next.maze);
@@ -119,10 +120,10 @@ function replace(made, opened, next, nextFile) {
   say("");
 }
 
-/// Writes what runs into the address; a file has no link.
+/// Writes the run into the address. A file has no link.
 const address = () => history.replaceState(null, "", file ? location.pathname + location.search : link.write(chosen));
 
-/// Changes the settings of what runs.
+/// Changes the settings of the run.
 export function setSettings(next) {
   for (const show of shows) show.set_settings(JSON.stringify(next));
   chosen = { ...chosen, settings: next };
@@ -132,7 +133,7 @@ export function setSettings(next) {
 export const setPace = (times) => (pace = times);
 
 export const canvases = ["picture", "picture-beside"];
-/// Times that devices are lost until WebGL draws instead of WebGPU.
+/// Number of lost devices after which WebGL draws instead of WebGPU.
 const MOST_LOSSES = 3;
 let losses = 0;
 let drawsByWebGPU = true;
@@ -152,7 +153,8 @@ async function renew(k) {
   }
 }
 
-/// Lets WebGL draw so many pictures. A canvas that WebGPU drew on gives no WebGL any more: others take their places.
+/// Switches this many pictures to WebGL. A canvas that was used for WebGPU no longer supports WebGL, so other canvases
+/// replace it.
 async function leaveWebGPU(count) {
   [drawsByWebGPU, losses] = [false, 0];
   for (const id of canvases) {
@@ -168,7 +170,7 @@ async function leaveWebGPU(count) {
 /// The first picture.
 export const openPicture = () => renew(0);
 
-/// The second picture, for the second of two shows; and new pictures for those whose device was lost.
+/// The second picture, for the second of two shows, and new pictures after the loss of a device.
 async function besides() {
   if (shows.length === 2 && pictures.length === 1) await renew(1);
   const lost = pictures.map((picture) => picture.is_lost());
@@ -178,14 +180,14 @@ async function besides() {
     for (const k of pictures.keys()) if (lost[k]) await renew(k);
   } else if (drawsByWebGPU) {
     await leaveWebGPU(pictures.length);
-    say("WebGL draws from now on: the device of WebGPU was lost again and again.");
+    say("WebGL now draws the picture: the WebGPU device was lost repeatedly.");
   } else {
     pictures.splice(0).forEach((picture) => picture.free());
-    throw new Error("there is no picture: the device that draws was lost again and again. The numbers are those of the run");
+    throw new Error("there is no picture: the device that draws was lost repeatedly. The numbers of the run are still shown");
   }
 }
 
-/// Shows all of the scene and follows its bodies, until the view is turned or moved or a body is touched.
+/// Shows the whole scene and follows its bodies, until the user turns or moves the view or touches a body.
 function whole() {
   if (framed === "by hand") return;
   if (framed !== aspect()) {
@@ -194,7 +196,7 @@ function whole() {
   } else if (!paused) shows.forEach((show) => show.follow(framed));
 }
 
-/// Steps as much as time has passed since the last picture, and draws.
+/// Steps for the time since the last picture, and draws.
 export async function frame(now) {
   const seconds = last === null ? 0 : Math.min((now - last) / 1000, 0.1);
   last = now;
@@ -240,7 +242,7 @@ async function steps(seconds) {
   if (seconds > 0) rates.steps += 0.1 * (made / seconds - rates.steps);
 }
 
-/// One step of all that runs; notes the first number that differs.
+/// One step of the whole run. It records the first number that differs.
 export async function step() {
   for (const show of shows) await show.step();
   if (shows.length === 2 && difference === null) {
@@ -266,7 +268,7 @@ function draw() {
   });
 }
 
-/// Numbers of what runs. While a step waits for a device they are those of the step before.
+/// Numbers of the run. While a step waits for a device, they are those of the step before.
 export function state() {
   return isBusy && latest ? latest : counted();
 }
@@ -302,20 +304,20 @@ function tell(now) {
   if (shows.length > 0) {
     numbers.show(told, told.steps !== shown.steps);
     shown.steps = told.steps;
-    // The device was lost, and another backend goes on.
+    // The device was lost, and another backend continues.
     if (told.fault && told.fault !== shown.fault) say(told.fault, true);
     shown.fault = told.fault;
   }
   shown.at = now;
 }
 
-/// Steps and draws from now on with each picture of the browser.
+/// Steps and draws from now on with each animation frame of the browser.
 export function loop() {
   const tick = (now) =>
     enqueue(() => frame(now))
       .catch(refuse)
       .finally(() => requestAnimationFrame(tick));
-  // Time that passes while the page is hidden is not made up for.
+  // Time in which the page is hidden is skipped.
   document.addEventListener("visibilitychange", () => (last = null));
   requestAnimationFrame(tick);
 }
@@ -342,7 +344,7 @@ const turned = (call) =>
     framed = "by hand";
     (game ? [game] : shows).forEach(call);
   });
-/// What pointers and keys do to what runs (pointer.js).
+/// The effects of pointers and keys on the run (pointer.js).
 export const act = {
   orbit: (by) => turned((show) => show.orbit(...by)),
   pan: (by) => turned((show) => show.pan(...by)),

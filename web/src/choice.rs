@@ -1,4 +1,4 @@
-//! Scenes and settings as the page names them.
+//! Scenes and settings by their names in the page.
 
 use drystone::backend::gpu::GpuOptions;
 use drystone::preset::Preset;
@@ -7,20 +7,20 @@ use drystone::stages::suggest::{hint, shorten};
 use drystone::{Backend, Cpu, Error, Gpu, Result, Scene, SolverConfig};
 use serde_json::{Map, Value};
 
-/// Most bodies of a scene of the page: about 4 kB each, of 4 GiB that WebAssembly has at most.
+/// Largest number of bodies of a scene in the page: about 4 kB each, and WebAssembly has at most 4 GiB.
 pub const MOST_BODIES: u64 = 200_000;
 
-/// A scene of the catalogue; `parameters` are `name=value`.
+/// A scene of the catalogue. `parameters` are `name=value`.
 pub fn scene(name: &str, parameters: &[String]) -> Result<Scene> {
     let entry = CATALOGUE.iter().find(|entry| entry.name == name).ok_or_else(|| {
         let known = CATALOGUE.iter().map(|entry| entry.name);
-        Error::input(format!("{name:?} is no scene of the catalogue{}", hint(name, known, "the gallery shows all")))
+        Error::input(format!("{name:?} is not a scene of the catalogue{}", hint(name, known, "the gallery shows all")))
     })?;
     check_size(name, entry.body_count(parameters)?)?;
     entry.build(parameters)
 }
 
-/// Refuses more bodies than the memory of a page bears.
+/// Refuses a number of bodies that exceeds the memory of a page.
 pub fn check_size(name: &str, bodies: u64) -> Result<()> {
     if bodies <= MOST_BODIES {
         return Ok(());
@@ -28,7 +28,7 @@ pub fn check_size(name: &str, bodies: u64) -> Result<()> {
     Err(Error::TooLarge(format!("{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser")))
 }
 
-/// What runs the sweeps: `cpu`, `webgpu`, or `webgpu-exact`, which has the bits of the CPU.
+/// Opens a backend for the sweeps: `cpu`, `webgpu`, or `webgpu-exact`, which has the bits of the CPU.
 pub async fn backend(name: &str) -> Result<Box<dyn Backend>> {
     Ok(match name {
         "cpu" => Box::new(Cpu::new()),
@@ -39,13 +39,13 @@ pub async fn backend(name: &str) -> Result<Box<dyn Backend>> {
     })
 }
 
-/// The settings of a JSON object: each by its name, over those of its `preset`.
+/// The settings of a JSON object, by name. They override those of its `preset`.
 pub fn config(text: &str) -> Result<SolverConfig> {
     let parsed = serde_json::from_str::<Map<String, Value>>(text);
     let mut changes = parsed.map_err(|e| Error::input(format!("settings: {e}")))?;
     let preset = match changes.remove("preset") {
         Some(Value::String(name)) => name.parse::<Preset>().map_err(|e| Error::input(format!("preset: {e}")))?,
-        Some(other) => return Err(Error::input(format!("preset: {other} is no name"))),
+        Some(other) => return Err(Error::input(format!("preset: {other} is not a name"))),
         None => Preset::default(),
     };
     let mut all = serde_json::to_value(preset.config()).map_err(Error::input)?;
@@ -102,7 +102,7 @@ mod tests {
     fn more_bodies_than_a_browser_holds_are_refused() {
         assert!(scene("tower", &["n=3".into()]).is_ok());
         let message = scene("towr", &[]).expect_err("a slip").to_string();
-        assert_eq!(message, "\"towr\" is no scene of the catalogue; did you mean \"tower\"? the gallery shows all");
+        assert_eq!(message, "\"towr\" is not a scene of the catalogue; did you mean \"tower\"? the gallery shows all");
         let message = scene("pile", &["n=4000000".into()]).expect_err("too many").to_string();
         assert_eq!(message, "pile: 4000000 bodies: must be at most 200000 in a browser");
     }

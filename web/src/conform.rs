@@ -6,15 +6,16 @@ use wasm_bindgen::prelude::*;
 
 use crate::thrown;
 
-/// Checks WebGPU in exact and in plain mode as `drystone conform` checks an adapter, fewer variants where it is `short`, and those checks
-/// only whose names contain one of `names`, if there are some. Calls `each` with a line after each check, and gives a line that counts them.
+/// Checks WebGPU in exact and in plain mode, like `drystone conform`. With `short` it checks fewer variants. If `names`
+/// is not empty, it runs only checks whose names contain one of them. It calls `each` with a line after each check, and
+/// returns a line with the counts.
 #[wasm_bindgen]
 pub async fn conform(short: bool, names: Vec<String>, each: Function) -> std::result::Result<String, JsError> {
     let options = ConformOptions { short, names, ..ConformOptions::default() };
     let mut tell = |check: &drystone::conform::Check| {
         let drystone::conform::Check { verdict, mode, group, name, figure, .. } = check;
         let line = format!("{verdict}: {mode}, {group}, {name}: {figure}");
-        // A listener that fails is no reason to stop.
+        // Continue even if a listener fails.
         let _ = each.call1(&JsValue::NULL, &line.into());
     };
     let found = thrown(conform_async(&options, &mut tell).await)?;

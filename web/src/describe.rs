@@ -1,4 +1,4 @@
-//! The catalogue and the settings as JSON, from the descriptions in the library.
+//! The catalogue and the settings as JSON, with the library's own descriptions.
 
 use drystone::SolverConfig;
 use drystone::preset::Preset;
@@ -29,7 +29,7 @@ pub fn settings() -> Value {
     json!({"presets": Preset::ALL.iter().map(preset).collect::<Vec<_>>(), "preset": Preset::default().to_string(), "settings": all})
 }
 
-/// All settings by name; a setting of a table is `table.name`.
+/// All settings by name. A nested setting is `table.name`.
 pub fn values(config: &SolverConfig) -> Map<String, Value> {
     let Ok(Value::Object(all)) = serde_json::to_value(config) else { return Map::new() };
     let flat = all.into_iter().flat_map(|(name, value)| match value {
@@ -39,7 +39,7 @@ pub fn values(config: &SolverConfig) -> Map<String, Value> {
     flat.collect()
 }
 
-/// A number with the digits of its f32; the f64 has digits of its rounding.
+/// A number with the digits of its f32; the f64 would show digits of rounding.
 fn short(value: Value) -> Value {
     match value.as_f64() {
         Some(x) if value.is_f64() => (x as f32).to_string().parse::<f64>().map_or(value, Value::from),
@@ -68,13 +68,13 @@ fn describe(schema: &Value, table: &Value, prefix: &str, defaults: &Map<String, 
     }
 }
 
-/// The first sentence of a description; the others give reasons.
+/// The first sentence of a description. The other sentences give reasons.
 fn sentence(property: &Value) -> String {
     let text = property["description"].as_str().unwrap_or_default().replace('\n', " ");
     text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first).to_owned()
 }
 
-/// The words that a setting takes.
+/// The words that a setting accepts.
 fn words(definition: &Value) -> Vec<Value> {
     let all = definition["oneOf"].as_array().or_else(|| definition["enum"].as_array());
     all.into_iter().flatten().map(|word| if word.is_string() { word.clone() } else { word["const"].clone() }).collect()

@@ -1,4 +1,4 @@
-//! The page of drystone: what its JavaScript calls.
+//! The functions of the page that its JavaScript calls.
 
 mod choice;
 mod conform;
@@ -15,13 +15,13 @@ use drystone::scenes::Spawners;
 use drystone::{Cpu, Result, Simulation, SolverConfig};
 use wasm_bindgen::prelude::*;
 
-/// A number that nothing else of the page has.
+/// A number that is unique in the page.
 fn next_number() -> u32 {
     static LAST: AtomicU32 = AtomicU32::new(0);
     LAST.fetch_add(1, Ordering::Relaxed) + 1
 }
 
-/// Lets a panic leave its message on the console of the browser; WebAssembly stops there.
+/// Makes a panic print its message on the browser's console. WebAssembly stops there.
 #[cfg(target_family = "wasm")]
 #[wasm_bindgen(start)]
 pub fn start() {
@@ -33,7 +33,7 @@ pub fn start() {
     std::panic::set_hook(Box::new(|info| error(&info.to_string())));
 }
 
-/// An exception of JavaScript with the line of an error.
+/// Converts an error to a JavaScript exception with its line.
 fn thrown<T>(result: Result<T>) -> std::result::Result<T, JsError> {
     result.map_err(|error| JsError::new(&error.to_string()))
 }
@@ -50,7 +50,8 @@ pub fn settings() -> String {
     describe::settings().to_string()
 }
 
-/// The hash of all poses and velocities after some steps of a scene on the CPU, as `drystone run SCENE --json` prints it.
+/// The hash of all poses and velocities after some steps of a scene on the CPU. `drystone run SCENE --json` prints the
+/// same hash.
 #[wasm_bindgen]
 pub fn hash_after(scene: &str, parameters: Vec<String>, steps: u32) -> std::result::Result<String, JsError> {
     thrown(hash_of(scene, &parameters, steps))

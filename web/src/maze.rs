@@ -40,9 +40,9 @@ impl Maze {
         BOARDS.iter().map(|(name, _)| (*name).to_owned()).collect()
     }
 
-    /// Lets some seconds pass; the board tilts to the right and to the front, each -1 to 1.
+    /// Advances the time by `seconds`. The board tilts to the right and to the front, each -1 to 1.
     pub async fn advance(&mut self, seconds: f32, right: f32, front: f32) -> std::result::Result<(), JsError> {
-        // A game tilts towards a pointer; at two thirds of the picture the tilt is at its limit.
+        // A game tilts towards a pointer, and reaches the largest tilt at two thirds of the picture.
         let at = Vec2::new(right, -front) / 1.5;
         if at == Vec2::ZERO {
             self.labyrinth.release();
@@ -61,12 +61,12 @@ impl Maze {
         told.to_string()
     }
 
-    /// Turns the camera by a drag, in heights of the picture.
+    /// Turns the camera after a drag, in heights of the picture.
     pub fn orbit(&mut self, x: f32, y: f32) {
         self.camera.orbit(Vec2::new(x, y));
     }
 
-    /// Moves the camera by a drag, in heights of the picture.
+    /// Moves the camera after a drag, in heights of the picture.
     pub fn pan(&mut self, x: f32, y: f32) {
         self.camera.pan(Vec2::new(x, y));
     }

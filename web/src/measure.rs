@@ -1,4 +1,4 @@
-//! A scene without pictures and records, for measurements: of a device by the page, of engines by web/measure.
+//! A scene without pictures and recording, for measurements: of a device by the page, of engines by web/measure.
 
 use drystone::metrics::Penetration;
 use drystone::scenes::SceneFile;
@@ -11,7 +11,7 @@ use crate::{choice, thrown};
 /// Numbers of a pose: position (m) and rotation.
 const POSE: usize = 7;
 
-/// A scene file that runs without pictures and records.
+/// A scene file that runs without pictures and recording.
 #[wasm_bindgen]
 pub struct Bare {
     simulation: Simulation,
@@ -39,7 +39,7 @@ impl Bare {
 
 #[wasm_bindgen]
 impl Bare {
-    /// The scene file of a pile of `boxes`.
+    /// The scene file of a pile with `boxes` boxes.
     pub fn pile(boxes: u32) -> std::result::Result<String, JsError> {
         let scene = choice::scene("pile", &[format!("n={boxes}")]);
         thrown(scene.and_then(|scene| SceneFile::of(&scene)).map(|file| file.to_text()))
@@ -51,13 +51,13 @@ impl Bare {
         thrown(Self::of(text, settings))
     }
 
-    /// Chooses what runs the sweeps: `cpu`, `webgpu` or `webgpu-exact`.
+    /// Chooses the backend of the sweeps: `cpu`, `webgpu` or `webgpu-exact`.
     pub async fn use_backend(&mut self, name: String) -> std::result::Result<(), JsError> {
         self.simulation.set_backend(thrown(choice::backend(&name).await)?);
         Ok(())
     }
 
-    /// Makes so many steps.
+    /// Makes `count` steps.
     pub async fn steps(&mut self, count: u32) -> std::result::Result<(), JsError> {
         for _ in 0..count {
             thrown(self.simulation.step_async(self.dt).await)?;

@@ -1,4 +1,4 @@
-//! Pictures on a canvas of the browser.
+//! Pictures on a browser canvas.
 
 use drystone::Result;
 use drystone_view::{Camera, Next, Shades, Sight, wgpu};
@@ -9,11 +9,11 @@ use crate::maze::Maze;
 use crate::show::Show;
 use crate::thrown;
 
-/// A canvas that worlds are drawn on.
+/// A canvas for drawing worlds.
 #[wasm_bindgen]
 pub struct Picture {
     sight: Sight,
-    /// What was drawn last ([`next_number`](crate::next_number)).
+    /// The number of the last drawn world ([`next_number`](crate::next_number)).
     drawn: u32,
 }
 
@@ -23,7 +23,7 @@ impl Picture {
         Ok(Self { sight: Sight::on_canvas(wgpu::SurfaceTarget::Canvas(canvas), size, webgpu).await?, drawn: 0 })
     }
 
-    /// Draws what has the number `number` on a canvas of `size` pixels.
+    /// Draws the world with the number `number` on a canvas of `size` pixels.
     fn paint(
         &mut self,
         number: u32,
@@ -48,28 +48,28 @@ impl Picture {
 
 #[wasm_bindgen]
 impl Picture {
-    /// A picture on a canvas: by WebGPU where there is one and `webgpu` allows it, else by WebGL.
+    /// Opens a picture on a canvas: with WebGPU if the browser has it and `webgpu` allows it, else with WebGL.
     pub async fn open(canvas: HtmlCanvasElement, webgpu: bool) -> std::result::Result<Picture, JsError> {
         thrown(Self::on(canvas, webgpu).await)
     }
 
-    /// What draws: `WebGPU` or `WebGL`.
+    /// The graphics API: `WebGPU` or `WebGL`.
     pub fn api(&self) -> String {
         if self.sight.api() == wgpu::Backend::BrowserWebGpu { "WebGPU" } else { "WebGL" }.into()
     }
 
-    /// Whether the device of the picture is lost, so that another picture has to be opened.
+    /// Whether the device of the picture is lost. Then another picture has to be opened.
     pub fn is_lost(&self) -> bool {
         self.sight.is_lost()
     }
 
-    /// Draws a scene on a canvas of `width` times `height` pixels, before a background of some color (sRGB, 0 to 1).
+    /// Draws a scene on a canvas of `width` times `height` pixels, in front of a background color (sRGB, 0 to 1).
     pub fn draw(&mut self, show: &mut Show, width: u32, height: u32, red: f32, green: f32, blue: f32) {
         let camera = show.camera;
         self.paint(show.number, &mut show.live, &camera, (width, height), [red, green, blue]);
     }
 
-    /// Draws a maze likewise.
+    /// Draws a maze in the same way.
     pub fn draw_maze(&mut self, maze: &mut Maze, width: u32, height: u32, red: f32, green: f32, blue: f32) {
         let camera = maze.camera;
         self.paint(maze.number, &mut maze.labyrinth, &camera, (width, height), [red, green, blue]);

@@ -13,7 +13,7 @@ use wasm_bindgen::prelude::*;
 use crate::choice;
 use crate::{next_number, thrown};
 
-/// Steps from each whole state of a recording to the next, and bytes after which a recording ends.
+/// Steps from one whole state of a recording to the next, and size at which a recording ends (bytes).
 const STATE_EVERY: u32 = 1200;
 const LONGEST: usize = 128 << 20;
 
@@ -24,9 +24,9 @@ pub struct Show {
     pub(crate) camera: Camera,
     #[cfg_attr(not(target_family = "wasm"), expect(dead_code, reason = "only browsers draw"))]
     pub(crate) number: u32,
-    /// What records the run; none where a recording runs again, or where the run became too long.
+    /// The recorder of the run, or `None` for a replay and for a run that became too long.
     recorder: Option<Recorder<Vec<u8>>>,
-    /// Why another backend went on, if a device was lost.
+    /// The message of the switch to another backend, if a device was lost.
     fault: Option<String>,
 }
 
@@ -84,7 +84,7 @@ impl Show {
 
     fn count(&mut self) -> Value {
         let depth = self.live.simulation.solved_penetration();
-        // The manifolds of sleeping bodies are not in the statistics of the step.
+        // The statistics of the step do not contain the manifolds of sleeping bodies.
         let (manifolds, points) =
             self.live.simulation.manifolds().fold((0, 0), |(all, points), m| (all + 1, points + m.points().len()));
         let Live { simulation, stats, stage_ms, steps, .. } = &self.live;
@@ -119,7 +119,7 @@ impl Show {
 
 #[wasm_bindgen]
 impl Show {
-    /// A scene of the catalogue; `parameters` are `name=value`, `settings` a JSON object.
+    /// A scene of the catalogue. `parameters` are `name=value`, and `settings` is a JSON object.
     pub fn scene(name: &str, parameters: Vec<String>, settings: &str) -> std::result::Result<Show, JsError> {
         thrown(Self::of_scene(name, &parameters, settings))
     }
@@ -134,7 +134,7 @@ impl Show {
         ColorBy::ALL.iter().map(|color| color.name().to_owned()).collect()
     }
 
-    /// Chooses what runs the sweeps: `cpu`, `webgpu` or `webgpu-exact`.
+    /// Chooses the backend of the sweeps: `cpu`, `webgpu` or `webgpu-exact`.
     pub async fn use_backend(&mut self, name: String) -> std::result::Result<(), JsError> {
         self.live.simulation.set_backend(thrown(choice::backend(&name).await)?);
         Ok(())
@@ -150,7 +150,7 @@ impl Show {
         self.live.scene().dt
     }
 
-    /// Whether a recording runs again.
+    /// Whether this is the replay of a recording.
     pub fn is_recording(&self) -> bool {
         self.live.is_recording()
     }
@@ -160,7 +160,7 @@ impl Show {
         self.live.is_recording() && self.live.paused
     }
 
-    /// Changes the settings to those of a JSON object; the run goes on.
+    /// Changes the settings to those of a JSON object. The run continues.
     pub fn set_settings(&mut self, settings: &str) -> std::result::Result<(), JsError> {
         thrown(choice::config(settings).and_then(|config| self.live.simulation.set_config(config)))
     }
@@ -170,12 +170,12 @@ impl Show {
         self.count().to_string()
     }
 
-    /// Turns the camera by a drag, in heights of the picture.
+    /// Turns the camera after a drag, in heights of the picture.
     pub fn orbit(&mut self, x: f32, y: f32) {
         self.camera.orbit(Vec2::new(x, y));
     }
 
-    /// Moves the camera by a drag, in heights of the picture.
+    /// Moves the camera after a drag, in heights of the picture.
     pub fn pan(&mut self, x: f32, y: f32) {
         self.camera.pan(Vec2::new(x, y));
     }
@@ -196,35 +196,36 @@ impl Show {
         self.camera = self.live.camera(aspect);
     }
 
-    /// Looks as another show does.
+    /// Copies the view of another show.
     pub fn look_as(&mut self, other: &Show) {
         self.camera = other.camera;
     }
 
-    /// Takes the dynamic body at a place of the picture, -1 to 1 from left to right and from bottom to top; whether there is one.
+    /// Grabs the dynamic body at a place of the picture, -1 to 1 from left to right and from bottom to top. Returns
+    /// whether there is one.
     pub fn grab(&mut self, x: f32, y: f32, aspect: f32) -> bool {
         let pointer = self.pointer(x, y, aspect);
         self.live.grab(&pointer)
     }
 
-    /// Pulls the body that was taken to a place of the picture.
+    /// Pulls the grabbed body to a place of the picture.
     pub fn drag(&mut self, x: f32, y: f32, aspect: f32) {
         let pointer = self.pointer(x, y, aspect);
         self.live.drag(&pointer);
     }
 
-    /// Lets the body go.
+    /// Releases the body.
     pub fn release(&mut self) {
         self.live.release();
     }
 
-    /// Throws a cube to a place of the picture.
+    /// Throws a cube towards a place of the picture.
     pub fn throw_cube(&mut self, x: f32, y: f32, aspect: f32) {
         self.live.point(&self.pointer(x, y, aspect));
         self.live.throw();
     }
 
-    /// Takes the dynamic body at a place of the picture out of the world.
+    /// Removes the dynamic body at a place of the picture.
     pub fn delete_body(&mut self, x: f32, y: f32, aspect: f32) {
         self.live.point(&self.pointer(x, y, aspect));
         self.live.delete();
@@ -242,7 +243,7 @@ impl Show {
         self.live.overlay = Overlay { contacts, joints, boxes };
     }
 
-    /// The world as it is now as a scene file.
+    /// The present world as a scene file.
     pub fn scene_file(&self) -> std::result::Result<String, JsError> {
         thrown(SceneFile::of(&self.live.scene_now()).map(|file| file.to_text()))
     }
@@ -251,15 +252,15 @@ impl Show {
     pub fn recording(&self) -> std::result::Result<Vec<u8>, JsError> {
         let none = || {
             Error::input(match self.live.is_recording() {
-                true => "a recording runs: its file is the recording",
-                false => "the run has become too long to be recorded: restart it",
+                true => "this is a replay: its file is the recording",
+                false => "the run is too long for a recording: restart it",
             })
         };
         thrown(self.recorder.as_ref().ok_or_else(none).and_then(|recorder| recorder.ended()))
     }
 }
 
-/// The first number that differs between two shows as JSON; none if they are the same in every bit.
+/// The first number that differs between two shows, as JSON; `None` if all bits are equal.
 #[wasm_bindgen]
 pub fn first_difference(a: &Show, b: &Show) -> Option<String> {
     let found = BodyDifference::first(&a.live.simulation.world, &b.live.simulation.world)?;

@@ -19,47 +19,50 @@ use crate::settings;
 use drystone::backend::{BackendChoice, choose};
 use drystone::{Backend, Error, Result};
 
-/// Times of the stages of a step, and errors: scenes at rest, or as one of the flags says.
+/// Measure the times of the stages of a step, and errors: for scenes at rest, or as one of the flags says.
 #[derive(Args)]
 pub struct BenchArgs {
-    /// Scenes, as name:key=value,worlds=N; without any, the standard scenes of the measurement.
+    /// Scenes, as name:key=value,worlds=N; by default the standard scenes of the measurement.
     scenes: Vec<String>,
-    /// Use smaller standard scenes, or fewer of them, and fewer turns.
+    /// Use smaller or fewer standard scenes, and fewer turns.
     #[arg(long)]
     quick: bool,
-    /// Time scenes from their first step on, in thirds: medians of all stages, the worst step, the first step apart.
+    /// Time scenes from their first step, in thirds: medians of all stages, the worst step, and the first step
+    /// separately.
     #[arg(long, group = "subject")]
     falling: bool,
-    /// Time a manifold and pass, and count bytes a box, of islands of 1,000 to 1,000,000 boxes; with --quick to 100,000.
+    /// Measure time per manifold and pass, and bytes per box, for islands of 1,000 to 1,000,000 boxes; with --quick up
+    /// to 100,000.
     #[arg(long, group = "subject")]
     growth: bool,
-    /// Count the steps of one world in a second, in 1 to 4096 worlds; with --quick to 256.
+    /// Count the steps per second of one world, in 1 to 4096 worlds; with --quick up to 256.
     #[arg(long, group = "subject")]
     worlds: bool,
-    /// Time what it takes to keep a state, to go back, to save and to load, beside a step, and count bytes a body.
+    /// Time keeping a state, going back, saving and loading, compared with a step, and count bytes per body.
     #[arg(long, group = "subject")]
     states: bool,
-    /// Compare sweeps with the limits of memory and arithmetic: bytes and operations that are counted, beside a triad and the peak.
+    /// Compare sweeps with the limits of memory and arithmetic: counted bytes and operations, compared with a triad and
+    /// the peak.
     #[arg(long, group = "subject")]
     limits: bool,
-    /// Steps of falling scenes.
+    /// Number of steps of falling scenes.
     #[arg(long, requires = "falling", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
-    /// Turns of each scene; a turn is 10 steps, and with --states one.
+    /// Number of turns of each scene; a turn is 10 steps, or one step with --states.
     #[arg(long, value_name = "N", conflicts_with_all = ["falling", "growth", "worlds"], value_parser = clap::value_parser!(u16).range(1..))]
     turns: Option<u16>,
     /// Backends that run the sweeps.
     #[arg(long, conflicts_with_all = ["growth", "worlds", "states", "limits"], value_parser = words::of::<BackendChoice>(), value_delimiter = ',', default_values = ["cpu"])]
     backend: Vec<BackendChoice>,
-    /// Numbers of threads; 0 means one per core.
+    /// Numbers of threads; 0 means one for each core.
     #[arg(long, value_delimiter = ',', default_values = ["0"], value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: Vec<u16>,
-    /// Any setting; may be given several times.
+    /// Set any setting; can be repeated.
     #[arg(long, conflicts_with_all = ["growth", "worlds", "states", "limits"], value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Show time ratios to an earlier output of --json.
     ///
-    /// Rows that are slower or faster beyond the spread are marked.
+    /// Rows with a change beyond the spread are marked.
     #[arg(long, conflicts_with = "subject", value_name = "FILE")]
     baseline: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -120,7 +123,7 @@ impl BenchArgs {
 
     fn settled(&self, threads: &[usize]) -> Result<()> {
         let config = settings::awake(self.set.iter().map(String::as_str))?;
-        // A bad file is refused before the measurement, which takes minutes.
+        // Refuse a bad file before the measurement, which takes minutes.
         let baseline = self.baseline.as_deref().map(Bench::read).transpose()?;
         let specs = self.specs(if self.quick { &QUICK } else { &STANDARD });
         let turns = self.turns();
@@ -145,7 +148,7 @@ impl BenchArgs {
         }
     }
 
-    /// Prints rows in the form that was asked for; the table has the columns of the CSV.
+    /// Prints rows in the requested form. The table has the columns of the CSV.
     fn show(&self, rows: &[impl Serialize], bar: &Progress) -> Result<()> {
         bar.finish();
         let machine = Machine::this();

@@ -20,7 +20,7 @@ pub struct CompareArgs {
     /// The two backends; the first is the reference.
     #[arg(long, value_parser = words::of::<BackendChoice>(), value_delimiter = ',', num_args = 1.., default_values = ["reference", "gpu"])]
     backends: Vec<BackendChoice>,
-    /// Use exact shaders also where the adapter takes no SPIR-V.
+    /// Use exact shaders even if the adapter does not accept SPIR-V.
     #[arg(long, conflicts_with = "plain")]
     exact: bool,
     /// Use plain WGSL, as in a browser.
@@ -31,7 +31,7 @@ pub struct CompareArgs {
 impl CompareArgs {
     pub fn run(&self) -> Result<()> {
         let &[a, b] = &self.backends[..] else {
-            return Err(Error::input(format!("--backends: two are compared, {} were given", self.backends.len())));
+            return Err(Error::input(format!("--backends: give two backends, not {}", self.backends.len())));
         };
         let (scene, config) = self.scene.load_awake(&self.worlds)?;
         self.scene.set_threads(BackendChoice::Auto);

@@ -16,35 +16,35 @@ use serde_json::{Value, json};
 
 /// Check an adapter and its driver.
 ///
-/// One line a check: verdict, mode, group, name, and what was measured. Exit code 0 where no check failed, 1 where one failed, 2 for bad
-/// arguments or a file that cannot be written, 3 where there is no such adapter.
+/// Prints one line for each check: verdict, mode, group, name, and measurement. The exit code is 0 if every check
+/// passed, 1 if one failed, 2 for bad arguments or a file that cannot be written, and 3 if there is no such adapter.
 #[derive(Args)]
 pub struct ConformArgs {
-    /// Check the first adapter whose name, API or driver contains this; `drystone adapters` lists them.
+    /// Check the first adapter whose name, API or driver contains this text; `drystone adapters` lists them.
     #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
     adapter: String,
-    /// Check exact shaders only.
+    /// Check only exact shaders.
     #[arg(long, conflicts_with = "plain")]
     exact: bool,
-    /// Check exact shaders in steered WGSL, as on adapters that take no SPIR-V, and no others.
+    /// Check only exact shaders in guarded WGSL, as on adapters that do not accept SPIR-V.
     #[arg(long, conflicts_with_all = ["exact", "plain"])]
     steered: bool,
-    /// Check plain WGSL only.
+    /// Check only plain WGSL.
     #[arg(long)]
     plain: bool,
-    /// Check these groups only.
+    /// Check only these groups.
     #[arg(long, value_name = "GROUP", value_parser = words::of::<Group>(), value_delimiter = ',', num_args = 1..)]
     group: Vec<Group>,
-    /// Make checks whose name contains one of these only.
+    /// Run only checks whose name contains one of these texts.
     #[arg(long, value_name = "TEXT", value_delimiter = ',', num_args = 1..)]
     name: Vec<String>,
-    /// Put arithmetic of kernels one percent off, to see that the checks find it.
+    /// Make the arithmetic of kernels wrong by one percent, to see that the checks find it.
     #[arg(long)]
     perturb: bool,
     /// Check fewer variants of kernels and fewer steps of scenes.
     #[arg(long)]
     short: bool,
-    /// Write a report in JUnit's XML.
+    /// Write a report in JUnit XML.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     junit: Option<PathBuf>,
     /// Write a report in JSON.
@@ -53,7 +53,7 @@ pub struct ConformArgs {
 }
 
 impl ConformArgs {
-    /// Whether no check failed.
+    /// Returns whether every check passed.
     pub fn run(&self) -> Result<bool> {
         let all = ConformOptions::default();
         let shader = self.perturb.then_some(one_percent_off as fn(&str, String) -> String);

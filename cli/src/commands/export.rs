@@ -15,15 +15,15 @@ use drystone::{ContactProblem, Error, Result, Scene};
 pub struct ExportArgs {
     /// A scene, or a contact problem.
     ///
-    /// A name of the catalogue or a .json file is a scene; any other file is a contact problem.
+    /// A catalogue name or a .json file is a scene; any other file is a contact problem.
     source: String,
-    /// Parameter of the scene; may be given several times.
+    /// Set a parameter of the scene; can be repeated.
     #[arg(short, long = "parameter", value_name = "KEY=VALUE")]
     parameter: Vec<String>,
     /// Export the contact problem of step N of the scene; 1 is the first.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     step: Option<u32>,
-    /// File for the problem in FCLIB's HDF5, global form.
+    /// File for the problem in FCLIB's HDF5 format, global form.
     #[arg(long, value_name = "FILE")]
     fclib: PathBuf,
 }
@@ -38,7 +38,10 @@ impl ExportArgs {
             check_touching(&problem)?;
             problem
         } else if self.step.is_some() || !self.parameter.is_empty() {
-            return Err(Error::input(format!("{}: a contact problem has no --step and no --parameter", self.source)));
+            return Err(Error::input(format!(
+                "{}: --step and --parameter need a scene, not a contact problem",
+                self.source
+            )));
         } else {
             ContactProblem::read(path)?
         };

@@ -21,13 +21,13 @@ use drystone::{Result, SolverConfig};
 
 #[derive(Args)]
 pub struct HardArgs {
-    /// Run this case, such as H3, instead of all; may be given several times.
+    /// Run this case, such as H3, instead of all cases; can be repeated.
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,
     /// Preset of the settings.
     #[arg(long, value_parser = words::of::<Preset>(), default_value_t)]
     preset: Preset,
-    /// Any setting; may be given several times.
+    /// Set any setting; can be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Backend that runs the sweeps.
@@ -37,13 +37,13 @@ pub struct HardArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     #[arg(conflicts_with_all = ["case", "short", "out", "shard", "merge"])]
     families: Option<u32>,
-    /// Judge this family alone; may be given several times.
+    /// Judge only this family; can be repeated.
     #[arg(long, value_name = "NAME", value_parser = words::of::<Family>(), requires = "families")]
     family: Vec<Family>,
     /// Seed of the first world of each family; the next ones follow.
     #[arg(long, value_name = "S", default_value_t = 1, requires = "families")]
     seed: u64,
-    /// Leave out the cases that take minutes.
+    /// Skip the cases that take minutes.
     #[arg(long)]
     short: bool,
     /// List the cases without running them.
@@ -51,16 +51,17 @@ pub struct HardArgs {
     list: bool,
     /// Write the page of all cases, or of all families, into this directory.
     ///
-    /// The page of cases has every preset on the CPU, and `balanced` on every backend; that of families the presets up to `accurate`.
+    /// The page of cases has every preset on the CPU, and `balanced` on every backend. The page of families has the
+    /// presets up to `accurate`.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json", "out", "shard", "merge"])]
     page: Option<PathBuf>,
-    /// Write the checks as CSV, those of a case as soon as it ran. A stopped run goes on after the cases in FILE.
+    /// Write the checks as CSV, each case when it ends. An interrupted run continues after the cases in FILE.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Run part I of N of the cases.
     #[arg(long, value_name = "I/N", requires = "out")]
     shard: Option<Shard>,
-    /// Take the checks from files of --out that shards wrote, with the same arguments, on machines of any kind, and run nothing.
+    /// Read the checks from --out files of shards with the same arguments, from any machines, and run nothing.
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "shard")]
     merge: Vec<PathBuf>,
     /// Print one JSON object instead of a table.

@@ -55,13 +55,13 @@ impl SettingsArgs {
     }
 }
 
-/// Prints each setting of a table under the first sentence of its description; nested tables come last.
+/// Prints each setting of a table below the first sentence of its description. Nested tables come last.
 fn print_settings(config: &toml::Table, schema: &Value, described: &Value) -> Result<()> {
     let properties = described["properties"].as_object().expect("a struct has properties");
     let (tables, settings): (Vec<_>, Vec<_>) = properties.iter().partition(|(name, _)| config[*name].is_table());
     for (name, property) in settings {
         let value = match &config[name] {
-            // The shortest text of the f32; the f64 has digits of its rounding.
+            // The shortest text of the f32; the f64 would show digits of rounding.
             toml::Value::Float(x) => format!("{:?}", *x as f32),
             value => value.to_string(),
         };
@@ -75,7 +75,7 @@ fn print_settings(config: &toml::Table, schema: &Value, described: &Value) -> Re
     Ok(())
 }
 
-/// The first sentence of a description; the others give reasons.
+/// The first sentence of a description. The other sentences give reasons.
 fn first_sentence(property: &Value) -> String {
     let text = property["description"].as_str().unwrap_or_default().replace('\n', " ");
     text.split_once(". ").map_or(text.trim_end_matches('.'), |(first, _)| first).to_owned()
@@ -85,7 +85,7 @@ fn definition<'a>(schema: &'a Value, property: &Value) -> Option<&'a Value> {
     property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")).map(|name| &schema["$defs"][name])
 }
 
-/// The words that a setting takes: ` One of a, b.`, or nothing.
+/// The words that a setting accepts: ` One of a, b.`, or nothing.
 fn words(schema: &Value, property: &Value) -> String {
     let values = definition(schema, property).and_then(|n| n["oneOf"].as_array().or_else(|| n["enum"].as_array()));
     let words: Vec<_> = values.into_iter().flatten().filter_map(|w| w["const"].as_str().or(w.as_str())).collect();

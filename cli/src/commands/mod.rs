@@ -1,4 +1,4 @@
-//! The command line: each command parses, makes one library call and prints.
+//! The command line. Each command parses its arguments, makes one library call and prints.
 
 #[cfg(feature = "gpu")]
 mod adapters;
@@ -37,7 +37,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use drystone::scenes::CATALOGUE;
 use drystone::stages::suggest::nearest;
 
-/// Contact between rigid bodies: run scenes, compare backends, solve contact problems.
+/// Simulate contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]
 #[command(name = "drystone", version, about, max_term_width = 100)]
 struct Cli {
@@ -49,7 +49,7 @@ struct Cli {
 enum Command {
     /// Run a scene and report on it.
     Run(run::RunArgs),
-    /// Run a scene on two backends and show how far apart they are.
+    /// Run a scene on two backends and measure the difference.
     Compare(compare::CompareArgs),
     /// Check an adapter and its driver: kernels, scenes, limits, long plans, lost devices.
     #[cfg(feature = "gpu")]
@@ -57,7 +57,7 @@ enum Command {
     /// Check an adapter and its driver (in builds with the feature gpu).
     #[cfg(not(feature = "gpu"))]
     Conform(NotBuilt),
-    /// Solve a contact problem and show how its error falls with the sweeps.
+    /// Solve a contact problem and show how its error falls from sweep to sweep.
     Solve(solve::SolveArgs),
     /// Run a scene in a window.
     #[cfg(feature = "view")]
@@ -68,13 +68,13 @@ enum Command {
     /// Write a contact problem for other solvers.
     #[cfg(feature = "fclib")]
     Export(export::ExportArgs),
-    /// Run hard cases and say which pass.
+    /// Run hard cases and report which ones pass.
     Hard(hard::HardArgs),
-    /// Let small worlds live for long and say whether they stay level.
+    /// Run small worlds for a long time and check that they stay level.
     Soak(soak::SoakArgs),
     /// Play a game.
     Play(play::PlayArgs),
-    /// Run a recording again and say where it differs.
+    /// Replay a recording and report differences.
     Replay(replay::ReplayArgs),
     /// Draw a scene: one picture, an animation, or every scene of the catalogue.
     #[cfg(feature = "view")]
@@ -82,7 +82,7 @@ enum Command {
     /// Draw a scene (in builds with `--features view`).
     #[cfg(not(feature = "view"))]
     Render(NotBuilt),
-    /// Measure what the stages of a step cost on standard scenes.
+    /// Measure the cost of the stages of a step on standard scenes.
     Bench(bench::BenchArgs),
     /// Make a page of tables and pictures from runs.
     Report(report::ReportArgs),
@@ -114,15 +114,15 @@ impl NotBuilt {
     }
 }
 
-/// Accepts negative numbers as values everywhere, so that clap reports a number out of range and not an unknown argument. clap does
-/// not recognize `-1e-3` as a number; real arguments therefore allow hyphens.
+/// Accepts negative numbers as values everywhere, so that clap reports a number out of range and not an unknown
+/// argument. Clap does not recognize `-1e-3` as a number, so real arguments allow hyphens.
 fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let takes = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional() && !a.is_allow_hyphen_values_set();
     let allow = |a: clap::Arg| if takes(&a) { a.allow_negative_numbers(true) } else { a };
     command.mut_args(allow).mut_subcommands(with_negative_numbers)
 }
 
-/// Parses the arguments; ends the process if they are invalid or ask for help.
+/// Parses the arguments. Ends the process if they are invalid or ask for help.
 fn arguments(words: &[OsString]) -> Cli {
     let command = with_negative_numbers(Cli::command());
     let parsed = command.clone().try_get_matches_from(words).and_then(|matches| Cli::from_arg_matches(&matches));
@@ -145,21 +145,21 @@ fn arguments(words: &[OsString]) -> Cli {
     })
 }
 
-/// Runs the command line. Exit codes: 0; 1 where a check of `conform` failed, or after a mistake in the program; 2 for bad input and files that
-/// cannot be written; 3 for a missing adapter or too little memory; 128 and the number of the signal that stopped the command: 130 for Ctrl-C,
-/// 141 where nobody reads standard output any more.
+/// Runs the command line. Exit codes: 0 for success; 1 if a check of `conform` failed, or after a defect in the
+/// program; 2 for bad input or a file that cannot be written; 3 for a missing adapter or too little memory; 128 plus
+/// the number of the signal that stopped the command: 130 for Ctrl-C, 141 if the reader of standard output is gone.
 pub fn main() -> ExitCode {
     main_of(&std::env::args_os().collect::<Vec<_>>())
 }
 
-/// The same, with the words of a command line: the first is the name of the program.
+/// The same for the words of a command line. The first word is the name of the program.
 pub fn main_of(words: &[OsString]) -> ExitCode {
     let cli = arguments(words);
     stop::guarded(|| cli.command.run())
 }
 
 impl Command {
-    /// Whether all checks passed; commands that check nothing pass.
+    /// Returns whether all checks passed; true for commands without checks.
     fn run(&self) -> drystone::Result<bool> {
         match self {
             #[cfg(feature = "gpu")]

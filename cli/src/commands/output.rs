@@ -13,12 +13,12 @@ pub(super) fn plain_table() -> Table {
     table
 }
 
-/// Calls `write` and prints a note if it replaced an existing file.
+/// Calls `write`, and prints a note if it replaced an existing file.
 pub(super) fn replacing<T>(path: &Path, write: impl FnOnce() -> Result<T>) -> Result<T> {
     let was_there = path.is_file();
     let written = write()?;
     if was_there {
-        say(format_args!("{}: replaced what was there", path.display()));
+        say(format_args!("{}: replaced an existing file", path.display()));
     }
     Ok(written)
 }
@@ -30,17 +30,17 @@ pub(super) fn print(text: impl Display) -> Result<()> {
     writeln!(std::io::stdout(), "{text}").map_err(Error::file(STANDARD_OUTPUT))
 }
 
-/// Whether the reader of standard output went away, as `head` does.
+/// Whether the reader of standard output is gone, as after `head`.
 pub(super) fn is_closed_pipe(error: &Error) -> bool {
     matches!(error, Error::File { path, source } if path == Path::new(STANDARD_OUTPUT) && source.kind() == ErrorKind::BrokenPipe)
 }
 
-/// Prints a line to standard error; unlike `eprintln!` without panicking if nothing reads it.
+/// Prints a line to standard error. Unlike `eprintln!`, it does not panic if nothing reads it.
 pub(super) fn say(text: impl Display) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// Prints the last line of a command that ends early, in place of a bar that may stand there.
+/// Prints the last line of a command that ends early. The line replaces a progress bar.
 pub(super) fn say_last(text: impl Display) {
     let clear = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
     say(format_args!("{clear}drystone: {text}"));

@@ -20,19 +20,19 @@ pub struct PlayArgs {
 
 #[derive(Subcommand)]
 enum GameArgs {
-    /// Roll the ball to the goal and not into a hole: arrow keys or the mouse tilt the board.
+    /// Roll the ball to the goal and past the holes: arrow keys or the mouse tilt the board.
     Maze(MazeArgs),
 }
 
 #[derive(Args)]
 struct MazeArgs {
-    /// easy, medium, hard, or the path of a map.
+    /// One of easy, medium and hard, or the path of a map.
     #[arg(default_value = "easy")]
     board: String,
-    /// Play this script of tilts without a window and print the result.
+    /// Play this script of tilts without a window, and print the result.
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// Find a way to the goal, follow it, and write the tilts as a script.
+    /// Find a path to the goal, follow it, and write the tilts as a script.
     #[arg(long, value_name = "FILE", conflicts_with = "script")]
     pilot: Option<PathBuf>,
     /// Draw the game: FILE.gif, FILE.mp4, FOLDER/, or the middle of the game as FILE.png.
@@ -48,7 +48,7 @@ struct MazeArgs {
     json: bool,
     #[command(flatten)]
     backend: BackendArgs,
-    /// Any setting; may be given several times.
+    /// Set any setting; can be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -88,7 +88,7 @@ impl MazeArgs {
         use crate::view::Output;
         use drystone_maze::SAMPLES;
         use drystone_view::{Canvas, draw_game, poses};
-        // Errors of the canvas and the file are reported before the game.
+        // Report errors of the canvas and the file before the game.
         let (map, world) = (game.map.clone(), game.world().clone());
         let mut canvas = Canvas::new(&world, self.size)?;
         let mut output = Output::open(out, self.size, SAMPLES)?;
@@ -120,7 +120,7 @@ impl MazeArgs {
         let how = match played.outcome {
             Outcome::Goal => "won",
             Outcome::Hole => "lost: the ball fell into a hole",
-            Outcome::Time => "not decided when the script ended",
+            Outcome::Time => "undecided when the script ended",
         };
         let slip = played.slip;
         print(format_args!("{} on {}: {how} after {:.2} s", played.board, played.engine, played.time))?;

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::say;
 
-/// Time between two lines if standard error is no terminal.
+/// Time between two lines if standard error is not a terminal.
 const BETWEEN: Duration = Duration::from_secs(10);
 
 /// The unit that shows progress as a share of the total.
@@ -17,12 +17,12 @@ pub const PERCENT: &str = "%";
 pub struct Progress {
     bar: ProgressBar,
     unit: &'static str,
-    /// Time of the last line; none on a terminal.
+    /// Time of the last line; `None` on a terminal.
     last: Option<Cell<Instant>>,
 }
 
 impl Progress {
-    /// Counts `count` units; `quiet` draws no bar.
+    /// Counts `count` units. `quiet` hides the bar.
     pub fn new(unit: &'static str, count: u64, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let style = match unit {

@@ -36,13 +36,13 @@ pub struct RenderArgs {
     out: Option<PathBuf>,
     /// Number of pictures, evenly spaced over the run.
     ///
-    /// One picture shows the end of the run. The default is 1 for PNG and 60 for the other formats.
+    /// A single picture shows the end of the run. The default is 1 for PNG and 60 for the other formats.
     #[arg(long, help_heading = PICTURES, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Width and height in pixels.
     #[arg(long, help_heading = PICTURES, value_name = "WxH", default_value = "960x640", value_parser = parse_size)]
     size: (u32, u32),
-    /// Quantity that the colors of bodies show.
+    /// Quantity that determines the colors of bodies.
     #[arg(long, help_heading = PICTURES, value_parser = words::of::<ColorBy>(), default_value_t)]
     color: ColorBy,
     /// Angle of the camera around the scene, in degrees.
@@ -51,7 +51,7 @@ pub struct RenderArgs {
     /// Elevation of the camera above the horizon, in degrees.
     #[arg(long, help_heading = PICTURES, value_name = "DEGREES", allow_hyphen_values = true, default_value_t = 25.0)]
     pitch: f32,
-    /// Draw the motion in a CSV file of `drystone run --out` of the same scene, without solving it again.
+    /// Draw the motion in a CSV file that `drystone run --out` wrote for the same scene, without solving it again.
     #[arg(long, help_heading = PICTURES, value_name = "FILE")]
     from: Option<PathBuf>,
     /// Draw every scene of the catalogue into this folder, with a page.
@@ -87,7 +87,7 @@ impl RenderArgs {
                 "--frames {frames}: a PNG is one picture; write FILE.gif, FILE.mp4 or FOLDER/"
             )));
         }
-        // Errors of the canvas and the file are reported before the run.
+        // Report errors of the canvas and the file before the run.
         let mut canvas = Canvas::new(&scene.world, self.size)?;
         let seconds = f64::from(scene.steps) * f64::from(scene.dt);
         let mut output = Output::open(out, self.size, f64::from(frames) / seconds.max(1e-3))?;
@@ -100,7 +100,7 @@ impl RenderArgs {
         print(out.display())
     }
 
-    /// Solves the scene, or runs the recording of it again, and keeps `frames` evenly spaced states.
+    /// Solves the scene, or replays its recording, and keeps `frames` evenly spaced states.
     fn shoot(
         &self,
         scene: Scene,

@@ -16,13 +16,13 @@ pub struct ReplayArgs {
     file: PathBuf,
     #[command(flatten)]
     backend: BackendArgs,
-    /// Go to this step at once, from the nearest state that the file has before it.
+    /// Start at this step, from the nearest earlier state in the file.
     #[arg(long, value_name = "STEP", default_value_t = 0)]
     from: u32,
-    /// Stop after this step, instead of the last.
+    /// Stop after this step, instead of after the last.
     #[arg(long, value_name = "STEP")]
     to: Option<u32>,
-    /// Threads on the CPU; 0 means one per core.
+    /// Threads on the CPU; 0 means one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
@@ -69,7 +69,7 @@ impl ReplayArgs {
         table.add_row(["hash", &hash]);
         print(table)?;
         match difference {
-            None => print("no difference from the recording in any hash"),
+            None => print("no difference from the recording: all hashes agree"),
             Some(d) => {
                 let body = d.body.map_or("a body".into(), |body| format!("body {body}"));
                 print(format_args!(

@@ -23,35 +23,35 @@ pub struct ReportArgs {
 
 #[derive(Subcommand)]
 enum Page {
-    /// Effects of each rule of the course sheet.
+    /// Show the effects of each rule, from the course sheet.
     Rules {
         /// Directory for the page and its pictures.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
     },
-    /// Times of a step beside other engines and beside the limits of the machine, from the rows in DIR/performance.
+    /// Compare times of a step with other engines and with the limits of the machine, from the rows in DIR/performance.
     ///
     /// `benches/performance` measures the rows and draws the page.
     Performance {
-        /// Directory for the page; its folder performance has the rows, as CSV, and gets the picture.
+        /// Directory for the page. Its folder performance has the rows as CSV, and gets the picture.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
     },
-    /// Tables of README.md and docs/speed-vs-error.md, from the rows in docs/report and docs/performance.
+    /// Write the tables of README.md and docs/speed-vs-error.md, from the rows in docs/report and docs/performance.
     Tables {
-        /// Directory of README.md and docs.
+        /// Directory with README.md and docs.
         #[arg(long, default_value = ".")]
         root: PathBuf,
-        /// Write nothing; fail if a table is not that of the rows.
+        /// Write nothing; fail if a table differs from the rows.
         #[arg(long)]
         check: bool,
     },
-    /// Sweeps that contact problems need to reach an error.
+    /// Count the sweeps that contact problems need to reach an error.
     Convergence {
         /// Directory for the page.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
-        /// Directory of contact problems, in addition to those of catalogue scenes.
+        /// Directory with contact problems, in addition to those of catalogue scenes.
         #[arg(long, value_name = "DIR")]
         problems: Option<PathBuf>,
         /// Table of benches/against_siconos.py, for the section on other solvers and its profiles.
@@ -60,38 +60,40 @@ enum Page {
     },
 }
 
-/// Speed against error: a page of pictures and tables, and the rows behind it.
+/// Compare speed and error: a page of pictures and tables, and the rows behind it.
 ///
-/// A stopped report continues: it keeps the rows in DIR that the same program measured on the same machine.
+/// An interrupted report continues: it keeps the rows in DIR that the same program measured on the same machine.
 #[derive(Args)]
 pub struct SurveyArgs {
-    /// Directory for index.html, speed-against-error.svg, scenes.csv, problems.csv and, with other engines, equal-error.md.
+    /// Directory for index.html, speed-against-error.svg, scenes.csv, problems.csv and, with other engines,
+    /// equal-error.md.
     #[arg(long, default_value = "report")]
     out: PathBuf,
-    /// Run fewer scenes and settings, within two minutes.
+    /// Run fewer scenes and settings, in less than two minutes.
     #[arg(long)]
     quick: bool,
-    /// Run all kinds of scenes with few bodies and settings, and no contact problems: with other engines within a quarter of an hour.
+    /// Run all kinds of scenes with few bodies and settings, and no contact problems: in less than a quarter of an hour
+    /// with other engines.
     #[arg(long, conflicts_with = "quick")]
     brief: bool,
-    /// Steps of each scene at most.
+    /// Largest number of steps of each scene.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     steps: Option<u32>,
-    /// Only this scene, as tower or tower:n=20,top_ratio=100 or a file; may be given several times.
+    /// Run only this scene, as tower or tower:n=20,top_ratio=100 or a file; can be repeated.
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
-    /// Directory of contact problems, in addition to those of catalogue scenes.
+    /// Directory with contact problems, in addition to those of catalogue scenes.
     #[arg(long, value_name = "DIR")]
     problems: Option<PathBuf>,
-    /// Threads of each engine.
+    /// Number of threads of each engine.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
     /// Run part I of N, and leave its rows in DIR/shard-I-of-N for --merge.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Make the report of the rows in these folders of shards, or files of rows, which machines of any kind measured.
+    /// Make the report from the rows in these shard folders or files, from any machines.
     ///
-    /// Needs the arguments of the shards.
+    /// It needs the arguments of the shards.
     #[arg(long, value_name = "PATH", num_args = 1.., conflicts_with = "shard")]
     merge: Vec<PathBuf>,
     /// Draw the existing rows without running scenes.
@@ -118,7 +120,7 @@ impl ReportArgs {
                 tables(root, *check)?.iter().try_for_each(|page| print(page.display()))
             }
             Some(Page::Convergence { out, problems, siconos }) => {
-                // A wrong table is refused before anything runs.
+                // Refuse a bad table before anything runs.
                 let others = siconos.as_deref().map(solvers).transpose()?;
                 let (bar, mut done) = (Progress::steps(0, false), 0);
                 let mut page = convergence(problems.as_deref(), |problems| {
@@ -161,7 +163,7 @@ impl SurveyArgs {
     }
 
     fn measure(&self, others: &[&Team]) -> Result<Report> {
-        // Fails only if the pool exists already. This thread is one of its threads.
+        // This fails only if the pool exists already. This thread is one of its threads.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads()).use_current_thread().build_global();
         let extent = match (self.quick, self.brief) {
             (true, _) => Extent::Quick,

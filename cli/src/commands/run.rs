@@ -21,7 +21,7 @@ pub struct RunArgs {
     scene: SceneArgs,
     #[command(flatten)]
     backend: BackendArgs,
-    /// Measure the time of each kernel by the clock of the GPU.
+    /// Measure the time of each kernel with the clock of the GPU.
     ///
     /// A software adapter is slower with this clock.
     #[arg(long, help_heading = MACHINE)]
@@ -33,9 +33,9 @@ pub struct RunArgs {
     /// Write the motion of all bodies except fixed ones as CSV.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     out: Option<PathBuf>,
-    /// Write the world as it is at the end as a scene file.
+    /// Write the world at the end as a scene file.
     ///
-    /// Poses, velocities, and the spawners with what is left of them; not the impulses of contacts.
+    /// The file has poses, velocities, and the remaining spawners, but not the impulses of contacts.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
     out_scene: Option<PathBuf>,
     /// Write every K-th step.
@@ -49,11 +49,11 @@ pub struct RunArgs {
     /// Record the run, for `drystone replay`, `view` and `render`.
     #[arg(long, value_name = "FILE", help_heading = OUTPUT, conflicts_with = "save_problem")]
     record: Option<PathBuf>,
-    /// Steps from each hash of all bodies to the next in the recording.
+    /// Steps from one hash of all bodies to the next in the recording.
     #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 10, requires = "record", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     hash_every: u32,
-    /// Steps from each whole state to the next in the recording.
+    /// Steps from one whole state to the next in the recording.
     #[arg(long, value_name = "K", help_heading = OUTPUT, default_value_t = 600, requires = "record", hide_short_help = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     state_every: u32,
@@ -72,11 +72,11 @@ fn check_save((step, file): &(u32, PathBuf), scene: &Scene) -> Result<()> {
     match joints {
         _ if !(1..=steps).contains(step) => refuse(format!("the run has steps 1 to {steps}")),
         0 => Ok(()),
-        _ => refuse(format!("{name} has {joints} joints, which a contact problem has not")),
+        _ => refuse(format!("{name} has {joints} joints: a contact problem cannot have joints")),
     }
 }
 
-/// An error of the recorder, which does not know the name of its file.
+/// Adds the name of the file to an error of the recorder.
 fn of_recording(path: &Path, error: Error) -> Error {
     match error {
         Error::File { source, .. } => Error::file(path)(source),

@@ -29,21 +29,21 @@ pub(super) struct SceneArgs {
     ///
     /// `drystone scenes` lists the catalogue.
     pub(super) scene: String,
-    /// Parameter of the scene; may be given several times.
+    /// Set a parameter of the scene; can be repeated.
     #[arg(short, long = "parameter", value_name = "KEY=VALUE", help_heading = SCENE)]
     pub(super) parameter: Vec<String>,
-    /// Number of steps, instead of the scene's own.
+    /// Number of steps, instead of the default of the scene.
     #[arg(long, help_heading = SCENE, value_parser = clap::value_parser!(u32).range(0..))]
     pub(super) steps: Option<u32>,
-    /// Length of a step, instead of the scene's own.
+    /// Length of a step, instead of the default of the scene.
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = SCENE)]
     pub(super) dt: Option<f32>,
     /// Preset of the settings; --set and other options change it.
     #[arg(long, value_parser = words::of::<Preset>(), conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
     pub(super) preset: Preset,
-    /// Choose the substeps by the largest overlap of bodies at rest, as 1mm.
+    /// Choose the substeps for this largest overlap of bodies at rest, as 1mm.
     ///
-    /// A bare number is in meters. A heavy load that is applied suddenly overlaps up to twice as deep.
+    /// A number without a unit is in meters. A heavy load that is applied suddenly overlaps up to twice as deep.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     #[arg(conflicts_with = "substeps", help_heading = SETTINGS)]
     pub(super) max_penetration: Option<f64>,
@@ -59,7 +59,7 @@ pub(super) struct SceneArgs {
     /// Method of the sweeps.
     #[arg(long, value_parser = words::of::<Method>(), help_heading = SETTINGS)]
     pub(super) method: Option<Method>,
-    /// Any setting; may be given several times.
+    /// Set any setting; can be repeated.
     ///
     /// `drystone settings` lists them.
     #[arg(long, value_name = "KEY=VALUE", help_heading = SETTINGS)]
@@ -67,7 +67,7 @@ pub(super) struct SceneArgs {
     /// Settings from a TOML file; --set and other options change them.
     #[arg(long, value_name = "FILE", help_heading = SETTINGS)]
     pub(super) config: Option<PathBuf>,
-    /// Threads on the CPU; 0 means one per core.
+    /// Threads on the CPU; 0 means one for each core.
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = MACHINE)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub(super) threads: u16,
@@ -81,7 +81,7 @@ pub(super) struct BackendArgs {
     /// Backend that runs the sweeps.
     #[arg(long = "backend", value_name = "BACKEND", value_parser = words::of::<BackendChoice>(), default_value_t, help_heading = MACHINE)]
     pub(super) choice: BackendChoice,
-    /// Make the GPU give the reference's results to the last bit.
+    /// Make results of the GPU equal to the reference to the last bit.
     #[arg(long, help_heading = MACHINE)]
     pub(super) exact: bool,
 }
@@ -93,7 +93,7 @@ pub(super) struct WorldsArgs {
     pub(super) worlds: u32,
     /// Increase this parameter by one from each world to the next.
     ///
-    /// Without it, all worlds are the same.
+    /// Without this option, all worlds are equal.
     #[arg(long, help_heading = SCENE, value_name = "KEY", requires = "worlds")]
     pub(super) vary: Option<String>,
 }
@@ -122,17 +122,19 @@ impl SleepArgs {
 }
 
 impl SceneArgs {
-    /// The scene, or some worlds of it, and the settings for a comparison: bodies sleep only with `--set sleep_after`.
+    /// The scene, or several worlds of it, and the settings for a comparison: bodies sleep only with `--set
+    /// sleep_after`.
     pub(super) fn load_awake(&self, worlds: &WorldsArgs) -> Result<(Scene, SolverConfig)> {
         self.load_from(self.base()?.without_sleep(), worlds)
     }
 
-    /// The scene, or some worlds of it ([`Scene::find_worlds`]), and the settings.
+    /// The scene, or several worlds of it ([`Scene::find_worlds`]), and the settings.
     pub(super) fn load(&self, worlds: &WorldsArgs) -> Result<(Scene, SolverConfig)> {
         self.load_from(self.base()?, worlds)
     }
 
-    /// The name and the parameters: a scene of the catalogue may have parameters behind a colon, as other commands take and print it.
+    /// The name and the parameters. A scene of the catalogue can have parameters after a colon, in the form that other
+    /// commands accept and print.
     fn parts(&self) -> (&str, Vec<String>) {
         let is_scene = |(name, _): &(&str, &str)| CATALOGUE.iter().any(|entry| entry.name == *name);
         let (name, own) = self.scene.split_once(':').filter(is_scene).unwrap_or((&self.scene, ""));
@@ -171,7 +173,7 @@ impl SceneArgs {
         Ok((scene, config))
     }
 
-    /// The recording that the scene names; none if it names no file of a recording.
+    /// The recording that the scene names, or `None` if it is not a recording file.
     #[cfg(feature = "view")]
     pub(super) fn recording(&self) -> Result<Option<Replay>> {
         let Ok(bytes) = std::fs::read(&self.scene) else { return Ok(None) };
@@ -187,11 +189,12 @@ impl SceneArgs {
     }
 }
 
-/// Sets the number of threads of the process; 0 means one per core, and one for the reference.
+/// Sets the number of threads of the process. 0 means one for each core, but one for the reference.
 pub(super) fn set_threads(threads: u16, backend: BackendChoice) {
     let unless_told = usize::from(backend == BackendChoice::Reference);
     let threads = if threads == 0 { unless_told } else { threads.into() };
-    // Fails only if the pool exists already. This thread is one of its threads: a separate pool costs 14 us per step.
+    // This fails only if the pool exists already. This thread is one of its threads: a separate pool costs 14 us per
+    // step.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
 }
 
@@ -200,7 +203,7 @@ pub(super) fn check_touching(problem: &ContactProblem) -> Result<()> {
     if !problem.contacts.is_empty() {
         return Ok(());
     }
-    Err(Error::input(format!("{}: nothing touches that is awake", problem.name)))
+    Err(Error::input(format!("{}: no awake body touches another", problem.name)))
 }
 
 /// Worlds with fewer bodies take less than a second to build.
@@ -209,7 +212,7 @@ const MANY_BODIES: u64 = 200_000;
 /// Prints a line before a large world is built.
 fn announce(scene: &str, parameters: &[String], worlds: usize) {
     let Some(entry) = CATALOGUE.iter().find(|e| e.name == scene) else { return };
-    // `Scene::find_worlds` refuses wrong parameters.
+    // `Scene::find_worlds` refuses wrong parameters later.
     let bodies = entry.body_count(parameters).unwrap_or(0).saturating_mul(worlds as u64);
     // A world that exceeds the memory is refused later, before it is built.
     if bodies >= MANY_BODIES && memory::check(bodies as f64 * memory::BODY, scene).is_ok() {
@@ -220,7 +223,7 @@ fn announce(scene: &str, parameters: &[String], worlds: usize) {
 /// Chooses the substeps for which the heaviest contact overlaps by at most `most`, and prints them.
 fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Result<()> {
     let Some(load) = Load::heaviest(&scene.world, config) else {
-        say(format_args!("substeps {}: no body of {} bears another", config.substeps, scene.name));
+        say(format_args!("substeps {}: no body of {} supports another", config.substeps, scene.name));
         return Ok(());
     };
     config.substeps = load.substeps(most, scene.dt, config)?;
@@ -232,7 +235,7 @@ fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Resul
     Ok(())
 }
 
-/// A length as `1mm`, `0.1cm` or `0.001m`; a bare number is in meters.
+/// Parses a length as `1mm`, `0.1cm` or `0.001m`. A number without a unit is in meters.
 fn length(text: &str) -> std::result::Result<f64, String> {
     let (number, unit) = text.split_at(text.find(|c: char| c.is_alphabetic() && c != 'e').unwrap_or(text.len()));
     let unit = match unit {

@@ -18,15 +18,16 @@ use drystone::{Error, Result};
 
 #[derive(Args)]
 pub struct SoakArgs {
-    /// A world of --list, a scene of the catalogue as NAME:KEY=VALUE,..., or a scene file; without any, the worlds of --list.
+    /// A world of --list, a scene of the catalogue as NAME:KEY=VALUE,..., or a scene file; by default the worlds of
+    /// --list.
     scene: Vec<String>,
-    /// Steps of each.
+    /// Number of steps of each world.
     #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(i64::from(ROWS)..))]
     steps: u32,
-    /// Write rows as CSV, each as soon as it is measured: they stay where the run is stopped.
+    /// Write rows as CSV, each when it is measured. They remain if the run is interrupted.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Judge the rows of a file and run nothing.
+    /// Judge the rows of a file, and run nothing.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["scene", "steps", "out"])]
     rows: Option<PathBuf>,
     /// List the worlds without running them.
@@ -34,12 +35,12 @@ pub struct SoakArgs {
     list: bool,
 }
 
-/// Rows that are written one by one: the file has whole rows at any time.
+/// Rows that are written one by one. The file has only complete rows at any time.
 struct Rows {
     path: PathBuf,
-    /// None before the first row: until then, an older file stays.
+    /// `None` before the first row: until then, an older file stays.
     file: Option<File>,
-    /// Bytes of all whole rows.
+    /// Size of all complete rows (bytes).
     length: u64,
 }
 
@@ -61,7 +62,7 @@ impl Rows {
         };
         files::note_rows(&self.path);
         if let Err(error) = file.write_all(&text) {
-            // Half a row is no row. A device has no length that could be set.
+            // Remove an incomplete row. The length of a device cannot be set.
             let _ = file.set_len(self.length);
             return Err(Error::file(&self.path)(error));
         }
@@ -103,7 +104,7 @@ impl SoakArgs {
         set_threads(1, BackendChoice::default());
         let names: Vec<&str> =
             if self.scene.is_empty() { NAMES.into() } else { self.scene.iter().map(String::as_str).collect() };
-        // A name that does not exist is refused before anything runs.
+        // Refuse an unknown name before anything runs.
         names.iter().try_for_each(|name| Soaked::new(name).map(drop))?;
         let mut out = self.out.as_deref().map(Rows::check).transpose()?;
         let bar = Progress::new("row", u64::from(ROWS) * names.len() as u64, false);

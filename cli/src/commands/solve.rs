@@ -25,27 +25,28 @@ const TOLERANCE: f64 = 1e-8;
 
 #[derive(Args)]
 pub struct SolveArgs {
-    /// A contact problem of `run --save-problem` (docs/contacts-format.md), or FCLIB's.
+    /// A contact problem of `run --save-problem` (docs/contacts-format.md), or an FCLIB file.
     file: PathBuf,
     /// Number of sweeps; the default is 512.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     sweeps: Option<u32>,
-    /// Solve until the error e_vel is less than this, with at most 40000 sweeps. The default of Newton's method is 1e-8.
+    /// Solve until the error e_vel is less than this, with at most 40000 sweeps. With Newton's method the default is
+    /// 1e-8.
     #[arg(long, value_name = "ERROR", allow_hyphen_values = true, conflicts_with = "sweeps")]
     tolerance: Option<f64>,
-    /// Method.
+    /// Method of solution.
     #[arg(long, value_parser = words::of::<SolveMethod>(), default_value = "accelerated")]
     method: SolveMethod,
-    /// Order of the sweeps; the default is manifolds, or contacts where a problem has no bodies.
+    /// Order of the sweeps; the default is manifolds, or contacts for a problem without bodies.
     #[arg(long, value_parser = words::of::<Order>())]
     order: Option<Order>,
-    /// Passes over a manifold before the next one; the default is 2 by manifolds and 1 by contacts.
+    /// Passes over a manifold before the next one; the default is 2 with manifolds and 1 with contacts.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
     passes: Option<u8>,
     /// Backend that runs the sweeps; errors are always measured in f64.
     #[arg(long, value_parser = words::of::<BackendKind>(), default_value = "f64")]
     backend: BackendKind,
-    /// Make the GPU give the reference's results to the last bit.
+    /// Make results of the GPU equal to the reference to the last bit.
     #[arg(long)]
     exact: bool,
     /// Print one JSON object instead of a table.
@@ -128,7 +129,7 @@ impl SolveArgs {
     }
 }
 
-/// What ended a solve, in words.
+/// The reason why a solve ended.
 fn ended(r: &NewtonReport) -> String {
     let newton = match r.newton {
         NewtonEnded::NotBegun => "Newton's method was not needed",

@@ -1,4 +1,5 @@
-//! Commands that end before their end: signals, closed pipes, full disks, panics. Each has one line that says what is left.
+//! Commands that end early: signals, closed pipes, full disks, panics. Each prints one line that says which outputs
+//! remain.
 
 use std::panic::{PanicHookInfo, UnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -8,14 +9,14 @@ use super::output::{is_closed_pipe, say_last};
 use crate::files;
 use drystone::Result;
 
-/// What a shell adds to the number of a signal that ended a program.
+/// A shell adds this to the number of the signal that ended a program.
 const SIGNALED: u8 = 128;
 const SIGPIPE: u8 = 13;
 
-/// The last panic: what it said, and where.
+/// The last panic: its message and its place.
 static PANIC: Mutex<String> = Mutex::new(String::new());
 
-/// Runs a command, and prints the line of one that does not come to its end.
+/// Runs a command. If it ends early, prints its last line.
 pub(super) fn guarded(run: impl FnOnce() -> Result<bool> + UnwindSafe) -> ExitCode {
     on_signals();
     quiet_panics();
@@ -24,29 +25,29 @@ pub(super) fn guarded(run: impl FnOnce() -> Result<bool> + UnwindSafe) -> ExitCo
     code.into()
 }
 
-/// The exit code of a command, and its line if it does not come to its end.
+/// The exit code of a command, and its last line if it ends early.
 fn ending(run: impl FnOnce() -> Result<bool> + UnwindSafe) -> (u8, Option<String>) {
     let error = match catch_unwind(run) {
         Ok(Ok(passed)) => return (u8::from(!passed), None),
         Ok(Err(error)) => error,
         Err(_) => {
             let what = PANIC.lock().unwrap_or_else(PoisonError::into_inner);
-            return (1, Some(format!("a mistake in drystone, please report it: {what}{}", files::left())));
+            return (1, Some(format!("a defect in drystone, please report it: {what}{}", files::left())));
         }
     };
     if is_closed_pipe(&error) {
-        return (SIGNALED + SIGPIPE, Some(format!("nobody reads standard output any more{}", files::left())));
+        return (SIGNALED + SIGPIPE, Some(format!("the reader of standard output is gone{}", files::left())));
     }
     (error.exit_code(), Some(format!("{error}{}", files::left())))
 }
 
-/// Lets signals end the process after unfinished files are removed.
+/// On a signal, unfinished files are removed before the process ends.
 #[cfg(unix)]
 fn on_signals() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
     use std::sync::Arc;
-    // A file that is larger than the limit of the shell is an error of the call that writes, in place of the end of the process. The calls
-    // fail only for signals that cannot be caught.
+    // If a file exceeds the size limit of the shell, the write call fails and the process continues. These calls fail
+    // only for signals that cannot be caught.
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP]) else { return };
     let wait = move || {
@@ -55,21 +56,21 @@ fn on_signals() {
             files::stop(|left| say_last(format_args!("stopped by {name}{left}")), i32::from(SIGNALED) + signal);
         }
     };
-    // Without this thread signals end the process as they do any other.
+    // Without this thread, signals end the process in the default way.
     let _ = std::thread::Builder::new().name("ctrl-c".into()).spawn(wait);
 }
 
-/// Lets Ctrl-C end the process after unfinished files are removed.
+/// On Ctrl-C, unfinished files are removed before the process ends.
 #[cfg(not(unix))]
 fn on_signals() {
     const SIGINT: i32 = 2;
-    // Fails only if a handler is set already.
+    // This fails only if a handler is already set.
     let _ = ctrlc::set_handler(|| {
         files::stop(|left| say_last(format_args!("stopped by Ctrl-C{left}")), i32::from(SIGNALED) + SIGINT)
     });
 }
 
-/// Keeps what a panic says for [`ending`]. With `RUST_BACKTRACE` it is printed at once, with its stack.
+/// Keeps the message of a panic for [`ending`]. With `RUST_BACKTRACE` it is printed at once, with its stack.
 fn quiet_panics() {
     let usual = std::panic::take_hook();
     let traces = std::env::var_os("RUST_BACKTRACE").is_some_and(|value| value != "0");
@@ -113,10 +114,10 @@ mod tests {
         let line = line.expect("a line");
         assert_eq!((code, line.lines().count()), (1, 1), "{line}");
         assert!(
-            line.starts_with("a mistake in drystone, please report it: a thing broke (cli/src/commands/stop.rs:"),
+            line.starts_with("a defect in drystone, please report it: a thing broke (cli/src/commands/stop.rs:"),
             "{line}"
         );
-        // Other tests of this process have files of their own.
+        // Other tests of this process have their own files.
         let (_, lost) = line.rsplit_once("; ").expect("what is left");
         assert!(lost.contains(&path.display().to_string()) && lost.ends_with(" not written"), "{line}");
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);

@@ -16,7 +16,7 @@ pub struct ViewArgs {
     backend: BackendArgs,
     #[command(flatten)]
     sleep: SleepArgs,
-    /// Quantity that the colors of bodies show.
+    /// Quantity that determines the colors of bodies.
     #[arg(long, value_parser = words::of::<ColorBy>(), default_value_t)]
     color: ColorBy,
 }

@@ -1,4 +1,4 @@
-//! Kinds of the library as values of arguments: their names, with a line of help each.
+//! Enums of the library as argument values: their names, and one line of help for each.
 
 use std::str::FromStr;
 
@@ -14,11 +14,11 @@ use drystone::solver::Order;
 use drystone_view::ColorBy;
 
 pub(super) trait Named: FromStr<Err = drystone::Error> + Clone + Send + Sync + 'static {
-    /// The name and the help of each value.
+    /// The name and the help text of each value.
     const WORDS: &'static [(&'static str, &'static str)];
 }
 
-/// Parses a value of a kind by its name.
+/// Parses a value by its name.
 pub(super) fn of<T: Named>() -> impl TypedValueParser<Value = T> {
     let values = T::WORDS.iter().map(|&(name, help)| PossibleValue::new(name).help(help));
     PossibleValuesParser::new(values).try_map(|name| name.parse::<T>())
@@ -48,11 +48,11 @@ impl Named for Family {
 #[cfg(feature = "gpu")]
 impl Named for Group {
     const WORDS: &'static [(&'static str, &'static str)] = &[
-        ("kernels", "Every kernel on random problems, against its double in Rust"),
-        ("scenes", "Every scene of the catalogue, small and short, against the reference"),
+        ("kernels", "Every kernel on random problems, compared with its twin in Rust"),
+        ("scenes", "Every scene of the catalogue, small and short, compared with the reference"),
         ("limits", "Large buffers, and problems beyond the limits of buffers and memory"),
-        ("long-dispatch", "Plans that would hold the device for long"),
-        ("device-lost", "Devices that are lost between and during steps"),
+        ("long-dispatch", "Plans that would hold the device for a long time"),
+        ("device-lost", "Devices that are lost between or during steps"),
     ];
 }
 
@@ -95,13 +95,13 @@ impl Named for SolveMethod {
     const WORDS: &'static [(&'static str, &'static str)] = &[
         Method::WORDS[0],
         Method::WORDS[1],
-        ("newton", "Newton's method on the central path, after sweeps while they pay; in double precision"),
+        ("newton", "Sweeps while they are efficient, then Newton's method on the central path; in double precision"),
     ];
 }
 
 impl Named for BackendChoice {
     const WORDS: &'static [(&'static str, &'static str)] = &[
-        ("auto", "A hardware GPU for scenes in which it is faster, by a measurement on a small pile; else the CPU"),
+        ("auto", "A hardware GPU if a measurement on a small pile shows that it is faster; else the CPU"),
         ("gpu", "The compute shaders, on the best adapter"),
         ("cpu", "The CPU lanes, on all threads"),
         ("reference", "The CPU reference, one constraint at a time on one thread"),

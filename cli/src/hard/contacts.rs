@@ -1,4 +1,4 @@
-//! Contacts of few bodies, without a defined normal, without inertia, or without a solution.
+//! Contacts between few bodies: without a defined normal, without inertia, or without a solution.
 
 use glam::{Quat, Vec3};
 
@@ -46,7 +46,7 @@ pub(super) fn no_direction(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// Presses stand in a crate on the floor: nothing drives it, and no number of substeps helps.
+/// A press overlaps a crate on the floor. Nothing drives the crate, and no number of substeps helps.
 pub(super) fn held(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for depth in [0.05, 0.1] {
         let mut simulation = setup.sleeping(Scene::find_spec(&format!("press:depth={depth}"))?.world)?;
@@ -61,7 +61,7 @@ pub(super) fn held(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// Wheels that reach into the chassis: joints and contacts push against each other, and what the motors give is all that there is.
+/// Wheels overlap the chassis, so joints and contacts push against each other. All energy comes from the motors.
 pub(super) fn jammed_car(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let free = Scene::find_spec("car")?.world;
     let (mass, speed) = (free.dynamic().map(|body| f64::from(body.mass.mass)).sum::<f64>(), 5.0);
@@ -92,7 +92,7 @@ pub(super) fn nearly_parallel(setup: &Setup, checks: &mut Checks) -> Result<()> 
         let turn = Quat::from_rotation_y(angle) * Quat::from_rotation_x(angle);
         rest(format!("turned by {angle:e} rad"), cube(0.0, 1.5).rotation(turn))?;
     }
-    // The cube stands on its edge, a little off balance.
+    // The cube stands on its edge, slightly off balance.
     let on_edge = Quat::from_rotation_z(std::f32::consts::FRAC_PI_4 + 0.01);
     let rocking = Body::dynamic().shape(Shape::cuboid(0.25, 0.25, 0.25)).rotation(on_edge);
     rest("a cube let go on its edge".into(), rocking.position(0.0, 1.0 + 0.25 * 2_f32.sqrt(), 0.0))?;
@@ -124,8 +124,8 @@ pub(super) fn no_inertia(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// Painlevé: the tip of an inclined rod slides at 5 m/s. If mu > 4/3, friction presses the tip into the floor at some angles faster
-/// than any normal force lifts it.
+/// Painlevé's paradox: the tip of an inclined rod slides at 5 m/s. If mu > 4/3, at some angles friction presses the tip
+/// into the floor faster than any normal force can lift it.
 pub(super) fn painleve(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for (mu, degrees, way) in
         [(1.5, 60.0, -1.0), (2.0, 60.0, -1.0), (2.0, 60.0, 1.0), (3.0, 45.0, -1.0), (3.0, 45.0, 1.0_f32)]

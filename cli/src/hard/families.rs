@@ -1,4 +1,5 @@
-//! Families of worlds in place of single cases: each world is held against its law, and the shares that pass are counted.
+//! Families of worlds instead of single cases: each world is checked against its law, and the passing shares are
+//! counted.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,12 +12,12 @@ use glam::Vec3;
 
 use super::{Check, Checks, LEAST, Setup, energy, passes};
 
-/// A world of a family as it ran.
+/// The results of a world of a family.
 #[derive(Clone, Debug)]
 pub struct Judged {
     pub seed: u64,
     pub checks: Vec<Check>,
-    /// Processor time of the median step over the bodies that move (ms).
+    /// Processor time of the median step, divided by the number of movable bodies (ms).
     pub ms: f64,
 }
 
@@ -24,7 +25,7 @@ pub struct Judged {
 #[derive(Clone, Debug)]
 pub struct FamilyShare {
     pub family: Family,
-    /// In the order of their seeds.
+    /// In the order of seeds.
     pub worlds: Vec<Judged>,
 }
 
@@ -41,34 +42,34 @@ impl FamilyShare {
         self.passed() as f64 / self.worlds.len() as f64
     }
 
-    /// The 95 % interval of the share.
+    /// The 95 % confidence interval of the share.
     pub fn interval(&self) -> [f64; 2] {
         wilson(self.passed(), self.worlds.len())
     }
 
-    /// Processor time of a step over the bodies that move (ms): the median of the worlds.
+    /// Processor time of a step, divided by the number of movable bodies (ms): the median over the worlds.
     pub fn ms(&self) -> f64 {
         median(&self.worlds.iter().map(|world| world.ms).collect::<Vec<_>>())
     }
 }
 
-/// The interval that holds a share with 95 % confidence, of which `passed` of `count` draws are known (E. B. Wilson, "Probable inference, the
+/// The 95 % confidence interval of a share, if `passed` of `count` draws passed (E. B. Wilson, "Probable inference, the
 /// law of succession, and statistical inference", 1927).
 fn wilson(passed: usize, count: usize) -> [f64; 2] {
-    /// 97.5 % of a normal distribution are below so many deviations.
+    /// 97.5 % of a normal distribution are below this number of standard deviations.
     const Z: f64 = 1.959_964;
     let n = count as f64;
     let (share, z2) = (passed as f64 / n, Z * Z);
     let middle = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    // Where all or none pass, rounding alone may leave the range.
+    // If all or none pass, rounding can leave the range.
     [(middle - half).max(0.0), (middle + half).min(1.0)]
 }
 
-/// The seeds of so many worlds from one on.
+/// `count` seeds, starting at `first`.
 ///
 /// # Errors
-/// Seeds end at 2^53, up to which a double has all whole numbers.
+/// Seeds end at 2^53: up to there, a double represents every whole number.
 pub fn seeds(first: u64, count: u32) -> Result<Vec<u64>> {
     let end = first.saturating_add(count.into());
     if end > 1 << 53 {
@@ -77,7 +78,8 @@ pub fn seeds(first: u64, count: u32) -> Result<Vec<u64>> {
     Ok((first..end).collect())
 }
 
-/// Judges the worlds of some seeds in each family: one world at a time on each of the threads of the machine. `done` is called after each.
+/// Judges the worlds of some seeds in each family, one world at a time on each thread of the machine. It calls `done`
+/// after each world.
 ///
 /// # Errors
 /// A world cannot be run.
@@ -91,7 +93,7 @@ pub fn judge_all(
         families.iter().flat_map(|&family| seeds.iter().map(move |&seed| (family, seed))).collect();
     let (next, judged) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || -> Result<()> {
-        // Steps of a world take the threads of the pool that they run in.
+        // The steps of a world use the threads of the pool that they run in.
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
@@ -121,23 +123,26 @@ pub fn judge_all(
         .collect())
 }
 
-/// A speed at which a body is at rest, over that of a fall by its size: its kinetic energy lifts it by 1e-4 of the size.
+/// Speed at which a body counts as at rest, divided by that of a fall by its size: its kinetic energy lifts it by 1e-4
+/// of the size.
 const AT_REST: f64 = 0.01;
-/// A body that sticks moves by less (m).
+/// Largest displacement of a body that sticks (m).
 const CREEP: f64 = 1e-3;
 /// Relative error of an acceleration.
 const ACCELERATION: f64 = 0.02;
-/// Relative error of the speed of a wave of dominoes. The law leaves out the friction that is there, and a step is up to a quarter of the time
-/// from one to the next: over 40 worlds the error was 1.4 % in the median and 5.5 % at most.
+/// Relative error of the speed of a wave of dominoes. The law neglects friction, and a step takes up to a quarter of
+/// the time from one domino to the next: over 40 worlds the median error was 1.4 % and the largest 5.5 %.
 const WAVE: f64 = 0.1;
-/// Gap of a joint over the length of a link, and energy gained over what a swing sets free, as in case H6.
+/// Gap of a joint relative to the length of a link, and energy gain relative to the energy that a swing releases, as in
+/// case H6.
 const GAP: f64 = 0.01;
 const GAIN: f64 = 1e-3;
 
-/// Kinetic energy of a pile over what its fall set free: bodies that roll go on, because nothing resists rolling.
+/// Kinetic energy of a pile relative to the energy that its fall released. It is not zero, because nothing resists
+/// rolling.
 const SETTLED: f64 = 1e-3;
 
-/// Runs a scene and holds it against a law.
+/// Runs a scene and checks it against a law.
 ///
 /// # Errors
 /// The scene cannot be run.
@@ -179,7 +184,7 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
         }
         Law::Settles => {
             checks.at_most("bodies outside", scene.escaped(end) as f64, 0.0);
-            // Nothing falls up: without a fall there is nothing to hold it against, and the check fails.
+            // Without a fall there is no released energy to compare with, and the check fails.
             let freed = (energy(start) - end.potential_energy()).max(0.0);
             checks.at_most(
                 "kinetic energy at the end over what the fall set free",
@@ -193,9 +198,9 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
     Ok(Judged { seed: 0, checks: checks.0, ms: median(&times) / start.dynamic_count() as f64 })
 }
 
-/// Quantities of all steps that a law is about.
+/// Quantities over all steps that laws refer to.
 struct Watch {
-    /// Energy of the start (J), and the most that was there more (J).
+    /// Energy at the start (J), and the largest gain (J).
     energy: f64,
     gained: f64,
     /// Largest gap of a joint (m).
@@ -226,8 +231,8 @@ impl Watch {
         }
     }
 
-    /// Speed of the wave (m/s), from a third of the row on, where it no longer has the speed of the push, to the last ones but five, behind
-    /// which nothing stands; NaN if it does not come so far.
+    /// Speed of the wave (m/s), between the first third of the row, where the push still affects it, and the last five
+    /// dominoes, which have few others beyond them. NaN if the wave does not get that far.
     fn wave(&self, start: &World) -> f64 {
         let (first, last) = (self.leaned.len() / 3, self.leaned.len().saturating_sub(6));
         let place = |k: usize| start.dynamic().nth(k).map_or(f64::NAN, |body| body.position.x.into());
@@ -236,7 +241,7 @@ impl Watch {
     }
 }
 
-/// The body that can move.
+/// The only movable body.
 fn only(world: &World) -> &drystone::Body {
     world.dynamic().next().expect("a block")
 }
@@ -245,12 +250,12 @@ fn way(start: &World, end: &World) -> f64 {
     only(start).position.as_dvec3().distance(only(end).position.as_dvec3())
 }
 
-/// Speed of a fall by the size of a body, which is twice its least half extent (m/s).
+/// Speed of a fall by the size of a body, which is twice its smallest half extent (m/s).
 fn fall(world: &World, body: &drystone::Body) -> f64 {
     (f64::from(world.gravity.length()) * 2.0 * f64::from(body.smallest_half_extent())).sqrt()
 }
 
-/// The largest speed of a body over that of a fall by its size.
+/// The largest speed of a body, divided by the speed of a fall by its size.
 fn speed(world: &World) -> f64 {
     largest(0.0, world.dynamic().map(|body| body.linear_velocity.as_dvec3().length() / fall(world, body)))
 }
@@ -302,7 +307,7 @@ mod tests {
             );
             assert!(!passes(&judged(&slides.scene, &sticks.law)), "{family}");
             assert!(!passes(&judged(&sticks.scene, &slides.law)), "{family}");
-            // Off by twice what is allowed, and a share of that for the error of the run itself.
+            // Off by twice the tolerance, and by a share of that for the error of the run itself.
             let Law::Slides(acceleration) = slides.law else { panic!("{:?}", slides.law) };
             assert!(!passes(&judged(&slides.scene, &Law::Slides(1.05 * acceleration))), "{family}");
         }
@@ -314,7 +319,7 @@ mod tests {
         assert!(passes(&judged(&scene, &law)));
         let Law::Topples { speed, angle } = law else { panic!("{law:?}") };
         assert!(!passes(&judged(&scene, &Law::Topples { speed: 1.25 * speed, angle })));
-        // The first one is not pushed.
+        // The first domino gets no push.
         scene.world.bodies[1] = scene.world.bodies[1].clone().velocity(Vec3::ZERO, Vec3::ZERO);
         assert!(!passes(&judged(&scene, &law)));
     }
@@ -325,7 +330,7 @@ mod tests {
         assert!(passes(&judged(&scene, &law)));
         let Law::Swings { link, energy } = law else { panic!("{law:?}") };
         assert!(!passes(&judged(&scene, &Law::Swings { link: 1e-6 * link, energy })));
-        // Something pulls the last one up all the time.
+        // The last domino is pulled up all the time.
         let last = scene.world.bodies.len() - 1;
         let weight = scene.world.bodies[last].mass.mass * scene.world.gravity;
         scene.world.bodies[last].force = -5.0 * weight;

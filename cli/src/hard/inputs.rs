@@ -14,7 +14,7 @@ pub(super) fn far_and_bad(setup: &Setup, checks: &mut Checks) -> Result<()> {
             f64::from((far.position - near.position - 1e3 * km * Vec3::X).abs().max_element())
         };
         let worst = at_origin.bodies.iter().zip(&far.bodies).map(off);
-        // The limit is twice the distance between neighboring numbers there.
+        // The limit is twice the spacing of floats at that distance.
         let what = format!("{km} km from the origin: a tower of 5, off the one at the origin [mm]");
         checks.at_most(what, 1e3 * largest(0.0, worst), most.into());
         checks.finite(&format!("{km} km from the origin: "), &far);

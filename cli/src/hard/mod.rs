@@ -1,4 +1,4 @@
-//! Hard cases for solvers: each measures quantities and compares them with limits.
+//! Hard cases for solvers. Each case measures quantities and compares them with limits.
 
 mod contacts;
 pub mod families;
@@ -38,7 +38,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Whether a value keeps the limit; NaN never does.
+    /// Whether a value satisfies the limit; NaN never does.
     pub fn holds(self, value: f64) -> bool {
         match self {
             Self::AtMost(limit) => value <= limit,
@@ -87,7 +87,7 @@ impl Setup<'_> {
         Simulation::new(world, self.config.clone(), (self.open)()?)
     }
 
-    /// A simulation whose bodies fall asleep, as they do at the defaults.
+    /// A simulation whose bodies can fall asleep, like the default.
     fn sleeping(&self, world: World) -> Result<Simulation> {
         let config = self.config.clone().with(|c| c.sleep_after = SolverConfig::default().sleep_after);
         Simulation::new(world, config, (self.open)()?)
@@ -123,13 +123,13 @@ const DT: f32 = 1.0 / 60.0;
 
 #[derive(Clone, Copy, Debug)]
 struct Outcome {
-    /// Number of dynamic bodies that are not in place.
+    /// Number of dynamic bodies that are out of place.
     fallen: f64,
     /// Largest horizontal distance of a body from its first position (m).
     drift: f64,
     /// Root mean square speed (m/s).
     rms: f64,
-    /// Deepest overlap of all times, measured twice a second (m).
+    /// Deepest overlap at any time, measured twice a second (m).
     deepest: f64,
     /// Deepest overlap at the end (m).
     at_rest: f64,
@@ -236,7 +236,8 @@ impl Case {
 mod tests {
     use super::*;
 
-    /// Two cubes overlap by 0.2 m and separate at 0.1 m/s at most: the overlap is 0.17 m after half a second and 0 after five.
+    /// Two cubes overlap by 0.2 m and separate at 0.1 m/s at most: the overlap is 0.17 m after half a second and 0
+    /// after five seconds.
     #[test]
     fn overlap_is_looked_at_on_the_way() {
         let mut world = weightless();

@@ -136,8 +136,8 @@ pub(super) fn flip(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// SimBenchmark's rolling test: a force pushes a plate with 25 balls at `angle` degrees from x to z. The accelerations have a closed
-/// form; the error is the mean over 4 s of |dv|² of the plate plus that of the first ball (m²/s²).
+/// SimBenchmark's rolling test: a force pushes a plate with 25 balls at `angle` degrees from x to z. The accelerations
+/// have a closed form. The error is the mean over 4 s of |dv|² of the plate plus that of the first ball (m²/s²).
 pub fn rolling_error(angle: f32, simulation: impl FnOnce(World) -> Result<Simulation>) -> Result<f64> {
     let scene = Scene::find("rolling", &[format!("angle={angle}")])?;
     let (m, plate, g, mu, balls, push) = (1.0, 10.0, 9.81, 0.4, 25.0, 150.0);
@@ -188,7 +188,7 @@ pub(super) fn release(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// Twenty ragdolls lie on the floor: nothing drives them.
+/// Twenty ragdolls fall on the floor, and nothing drives them.
 pub(super) fn ragdolls(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let mut simulation = setup.sleeping(Scene::find("ragdolls", &[])?.world)?;
     let speeds = watch(&mut simulation, 300, |world| metrics::fastest(world).0)?;
@@ -198,7 +198,8 @@ pub(super) fn ragdolls(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// The bodies that a scene of the catalogue loses in some steps, and the energy at the end over that of the start.
+/// The number of bodies that a scene of the catalogue loses in `steps` steps, and the final energy relative to the
+/// initial energy.
 fn lost(setup: &Setup, spec: &str, steps: usize) -> Result<[f64; 2]> {
     let scene = Scene::find_spec(spec)?;
     let before = energy(&scene.world);
@@ -207,7 +208,7 @@ fn lost(setup: &Setup, spec: &str, steps: usize) -> Result<[f64; 2]> {
     Ok([scene.escaped(&simulation.world) as f64, energy(&simulation.world) / before])
 }
 
-/// What is thinner than its way in a step falls on triangles.
+/// Bodies that are thinner than their path in a step fall on triangles.
 pub(super) fn terrain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for (spec, name) in [("terrain", "from 5 m"), ("terrain:n=30,height=50", "from 50 m")] {
         checks.at_most(format!("{name}: bodies lost"), lost(setup, spec, 400)?[0], 0.0);
@@ -215,7 +216,7 @@ pub(super) fn terrain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// What is fast meets thin walls, and keeps its energy.
+/// Fast bodies hit thin walls and keep their energy.
 pub(super) fn bullets(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for speed in [10.0, 100.0, 1000.0] {
         let [lost, energy] = lost(setup, &format!("bullets:speed={speed}"), 120)?;

@@ -1,4 +1,4 @@
-//! Stacks that should stand.
+//! Structures that should stand.
 
 use super::{Checks, DT, Limit, Setup};
 use drystone::config::Method;
@@ -8,9 +8,9 @@ use drystone::solver::{Order, Solver};
 use drystone::stats::largest;
 use drystone::{Body, Result, Scene, Shape, SolvedManifold, World};
 
-/// Sweeps over the first step; a power of two.
+/// Number of sweeps over the first step; a power of two.
 const SWEEPS: u32 = 4096;
-/// Steps in ten seconds.
+/// Number of steps in ten seconds.
 const TEN: u32 = 600;
 
 pub(super) fn light_under_heavy(setup: &Setup, checks: &mut Checks) -> Result<()> {
@@ -78,7 +78,8 @@ fn cube_on_pads(side: usize) -> World {
     world
 }
 
-/// The number of contact points, and the largest relative difference of the force on a pad from the mean over its mirror images.
+/// The number of contact points, and the largest relative difference between the force on a pad and the mean over its
+/// mirror images.
 fn asymmetry(manifolds: impl Iterator<Item = SolvedManifold> + Clone, side: usize) -> (usize, f64) {
     let force = |m: &SolvedManifold| m.points().iter().map(|p| f64::from(p.normal_impulse)).sum::<f64>();
     let points = manifolds.clone().map(|m| m.points().len()).sum();

@@ -1,4 +1,5 @@
-//! Whether a world stayed level: the last tenth of its steps beside the second. In the first it settles.
+//! Checks whether a world stayed level: it compares the last tenth of its steps with the second tenth. In the first
+//! tenth the world settles.
 
 use drystone::stats::median;
 use drystone::{Error, Result};
@@ -6,23 +7,23 @@ use drystone::{Error, Result};
 use super::Row;
 use crate::hard::{Check, Limit};
 
-/// Fewest rows of a world that is judged.
+/// Smallest number of rows for a judgment.
 const FEWEST: usize = 20;
-/// Resident memory that a world may gain, whatever its steps: what the allocator of the system keeps for itself (B).
+/// Resident memory that a world can gain in any number of steps: the system's allocator keeps some for itself (B).
 const GAIN: f64 = (1 << 20) as f64;
-/// Resident memory that a world may gain in 100,000 steps (B). A body with its contacts takes 2,000 B and more.
+/// Resident memory that a world can gain in 100,000 steps (B). A body with its contacts takes 2,000 B or more.
 const GAIN_A_STEP: f64 = (32 << 10) as f64 / 1e5;
 
-/// How a number may change from the second tenth to the last.
+/// The allowed change of a quantity from the second tenth to the last.
 #[derive(Clone, Copy)]
 enum Level {
-    /// To so many times at most.
+    /// By at most this factor.
     Below(f64),
-    /// To so many times at most, and a share of one over as many at least: what stands still at the end is not level.
+    /// By at most this factor up or down. A quantity that stops at zero is not level.
     Within(f64),
 }
 
-/// A quantity with its name, from a row.
+/// A quantity: its name, its value in a row, and its limit.
 type Quantity = (&'static str, fn(&Row) -> f64, Level);
 
 const LEVEL: [Quantity; 9] = [
@@ -44,7 +45,7 @@ const LEVEL: [Quantity; 9] = [
 pub fn judge(rows: &[Row]) -> Result<Vec<Check>> {
     let (count, name) = (rows.len(), rows.first().map_or("soak", |row| &row.scene));
     if count < FEWEST {
-        return Err(Error::input(format!("{name}: {count} rows, and {FEWEST} are the fewest that can be judged")));
+        return Err(Error::input(format!("{name}: {count} rows: a judgment needs at least {FEWEST}")));
     }
     let (second, last) = (&rows[count / 10..count / 5], &rows[count - count / 10..]);
     let mut checks = Vec::new();
@@ -53,7 +54,7 @@ pub fn judge(rows: &[Row]) -> Result<Vec<Check>> {
     };
     for (what, of, level) in LEVEL {
         let [then, now] = [second, last].map(|rows| median(&rows.iter().map(of).collect::<Vec<_>>()));
-        // What is below a hundredth is nothing: rounding alone may change it by any factor.
+        // Treat a value below a hundredth as zero: rounding alone can change it by any factor.
         let ratio = if then.max(now) < 0.01 { 1.0 } else { now / then };
         let what = format!("{what}, the last tenth over the second");
         match level {
@@ -74,7 +75,7 @@ pub fn judge(rows: &[Row]) -> Result<Vec<Check>> {
     let most = |of: fn(&Row) -> f64| rows.iter().map(of).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
     let overlaps: Vec<_> = rows.iter().map(|row| row.overlap).collect();
     check("deepest overlap, median of the ends of rows [m]".into(), median(&overlaps), Limit::AtMost(5e-3));
-    // What fell by 2 m moves by 0.1 m a step, and may be caught in the middle of a hit.
+    // A body after a fall of 2 m moves by 0.1 m a step, and a row can end in the middle of its hit.
     check("deepest overlap at the end of any row [m]".into(), most(|row| row.overlap), Limit::AtMost(0.1));
     check("bodies outside".into(), most(|row| row.outside), Limit::AtMost(0.0));
     check("handles that name a wrong body or none".into(), most(|row| row.lost), Limit::AtMost(0.0));

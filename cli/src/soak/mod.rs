@@ -1,4 +1,4 @@
-//! Worlds that live for long: what has to stay level while they do.
+//! Worlds that run for a long time, with checks that they stay level.
 
 mod judge;
 mod worlds;
@@ -12,41 +12,42 @@ pub use judge::judge;
 use worlds::Acts;
 pub use worlds::{NAMES, WORLDS};
 
-/// Rows of a world, whatever its steps.
+/// Number of rows of a world, for any number of steps.
 pub const ROWS: u32 = 100;
 
-/// What some steps of a world came to: means over the steps, if nothing else is said.
+/// The measurements of some steps of a world. Values are means over the steps unless they say otherwise.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Row {
     pub scene: String,
-    /// Steps from the first of the run to the end of these.
+    /// Number of steps from the start of the run to the end of this row.
     pub step: u32,
     /// Processor time of a step (ms).
     pub ms: f64,
-    /// Resident memory of the process at the end (B); empty where the system does not say.
+    /// Resident memory of the process at the end (B); empty if the system does not report it.
     pub resident: Option<f64>,
     /// Size of the saved state at the end (B).
     pub state: f64,
-    /// Bodies at the end, and places for bodies.
+    /// Number of bodies, and of places for bodies, at the end.
     pub bodies: f64,
     pub places: f64,
-    /// Joints at the end.
+    /// Number of joints at the end.
     pub joints: f64,
     pub pairs: f64,
-    /// Slots for contacts at the end, free ones included.
+    /// Number of slots for contacts at the end, including free ones.
     pub slots: f64,
     pub asleep: f64,
     /// Kinetic energy (J).
     pub energy: f64,
     /// Deepest overlap at the end (m).
     pub overlap: f64,
-    /// Bodies outside the container at the end.
+    /// Number of bodies outside the container at the end.
     pub outside: f64,
-    /// Handles at the end that name no body though theirs is there, or one though theirs is gone.
+    /// Number of wrong handles at the end: they name no body although theirs exists, or a body although theirs was
+    /// removed.
     pub lost: f64,
 }
 
-/// A world that lives.
+/// A world for a long run.
 pub struct Soaked {
     scene: Scene,
     spawners: Spawners,
@@ -56,7 +57,8 @@ pub struct Soaked {
 }
 
 impl Soaked {
-    /// A world of [`WORLDS`], or a scene of the catalogue with its parameters as `name:key=value,...`, or a scene file.
+    /// Finds a world of [`WORLDS`], or a scene of the catalogue with its parameters as `name:key=value,...`, or a scene
+    /// file.
     ///
     /// # Errors
     /// There is no such world or scene.
@@ -69,10 +71,10 @@ impl Soaked {
         Ok(Self { scene, spawners, acts, simulation, step: 0 })
     }
 
-    /// Moves the world by some steps.
+    /// Advances the world by some steps.
     ///
     /// # Errors
-    /// A step fails, or leaves a number that is none.
+    /// A step fails, or leaves a number that is not finite.
     pub fn go(&mut self, steps: u32) -> Result<Row> {
         let (mut spent, mut pairs, mut asleep, mut energy) = (0.0, 0.0, 0.0, 0.0);
         for _ in 0..steps {
@@ -132,7 +134,7 @@ mod tests {
         }
     }
 
-    /// The first box is there before any spawner brought one.
+    /// The first box exists before any spawner adds one.
     #[test]
     fn what_is_there_at_first_leaves_too() {
         let mut soaked = Soaked::new("conveyor").expect("a world");

@@ -1,4 +1,4 @@
-//! The worlds that are soaked: small, and the same on average however long they live.
+//! The worlds of soak runs: small, and on average constant over time.
 
 use std::collections::VecDeque;
 
@@ -6,7 +6,7 @@ use drystone::stages::random::SplitMix64;
 use drystone::{Body, BodyHandle, Joint, Result, Scene, Shape, World};
 use glam::{Quat, Vec3};
 
-/// The worlds by name, each with a line of description.
+/// The worlds by name, each with a one-line description.
 pub const WORLDS: &[(&str, &str)] = &[
     ("drum", "60 boxes in a drum that turns"),
     ("shaken", "60 boxes in a tray that is shaken"),
@@ -26,7 +26,7 @@ pub const NAMES: [&str; WORLDS.len()] = {
     names
 };
 
-/// What happens to a world while it lives, beside its spawners.
+/// The actions on a world while it runs, in addition to its spawners.
 pub enum Acts {
     None,
     Shakes(BodyHandle),
@@ -53,7 +53,7 @@ fn tray(body: Body, half: f32) -> Body {
     })
 }
 
-/// A scene that nothing is to leave.
+/// A scene that no body should leave.
 fn scene(world: World, half: f32) -> Scene {
     let reach = Vec3::new(half, 0.0, half);
     Scene { container: Some((-reach - 0.1, reach + Vec3::new(0.1, 4.0, 0.1))), ..Scene::new("", world, 0) }
@@ -71,7 +71,7 @@ fn shaken() -> (Scene, Acts) {
     let mut world = World::new();
     let moved = world.insert(tray(Body::kinematic().named("tray"), HALF));
     boxes(&mut world, 60, 0.1, 0.25);
-    // The tray moves there and back by 4 cm.
+    // The tray moves by 4 cm to and fro.
     (scene(world, HALF + 0.05), Acts::Shakes(moved))
 }
 
@@ -89,15 +89,15 @@ fn rain() -> (Scene, Acts) {
     (scene(world, 1.5), Acts::Rains(rain))
 }
 
-/// Bodies that come and go.
+/// Bodies that appear and disappear.
 pub struct Rain {
-    /// Bodies that are there, the oldest first.
+    /// Bodies in the world, the oldest first.
     here: VecDeque<BodyHandle>,
-    /// Bodies that went last.
+    /// The last removed bodies.
     gone: VecDeque<BodyHandle>,
-    /// Bodies that stay at most.
+    /// Largest number of bodies.
     keeps: usize,
-    /// Bodies that came, modulo the places to which they come.
+    /// Number of added bodies, modulo the number of places.
     came: u32,
     random: SplitMix64,
 }
@@ -118,7 +118,7 @@ impl Rain {
             _ => Shape::cuboid(a, b, c),
         };
         let turn = Quat::from_xyzw(self.within(1.0), self.within(1.0), self.within(1.0), 1.5).normalize();
-        // The nine places in turn: the body that came to the same place before has fallen by a meter.
+        // Use the nine places in turn: the previous body at the same place has fallen by a meter.
         let place = |k: u32| 0.8 * ((k % 3) as f32 - 1.0);
         self.came = (self.came + 1) % 9;
         Body::dynamic().shape(shape).position(place(self.came), 3.0, place(self.came / 3)).rotation(turn)
@@ -129,7 +129,7 @@ impl Rain {
             return;
         }
         if self.here.len() >= self.keeps {
-            // One of the older half.
+            // A body of the older half.
             let place = (self.random.bits() % (self.here.len() as u64 / 2)) as usize;
             let oldest = self.here.remove(place).expect("a place");
             world.remove(oldest);
@@ -140,7 +140,7 @@ impl Rain {
         }
         let body = self.body();
         let new = world.insert(body);
-        // Neighbors of a row, which come one after the other.
+        // Neighbors in a row, which are added one after the other.
         let before = self.here.back().copied().filter(|_| step.is_multiple_of(15) && !self.came.is_multiple_of(3));
         if let Some([a, b]) = before.and_then(|before| Some([world.body(before)?, world.body(new)?])) {
             let middle = a.position.midpoint(b.position);
@@ -157,7 +157,8 @@ impl Acts {
         match self {
             Self::None => {}
             Self::Shakes(tray) => {
-                // There and back in 20 steps, from where the last step left it, so that rounding adds up to nothing.
+                // To and fro in 20 steps, from the place where the last step left it, so that rounding errors do not
+                // add up.
                 let phase = (step + 1) % 20;
                 let target = 4e-3 * (if phase < 10 { phase as f32 } else { 20.0 - phase as f32 });
                 let tray = world.body_mut(*tray).expect("the tray stays");
@@ -176,7 +177,7 @@ impl Acts {
         }
     }
 
-    /// Bodies that are not there though they should be, and those that are though they should not.
+    /// Number of bodies that are missing, or that still exist after their removal.
     pub fn lost(&self, world: &World) -> usize {
         let missing =
             |all: &mut dyn Iterator<Item = &BodyHandle>| all.filter(|&&body| world.body(body).is_none()).count();
@@ -191,7 +192,7 @@ impl Acts {
         }
     }
 
-    /// Lets as many bodies stay.
+    /// Sets the largest number of bodies.
     #[cfg(test)]
     pub fn keep(&mut self, bodies: usize) {
         if let Self::Rains(rain) = self {

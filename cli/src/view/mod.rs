@@ -1,4 +1,4 @@
-//! The window and files of pictures.
+//! The window, and picture files.
 
 mod open;
 mod output;

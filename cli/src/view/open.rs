@@ -80,7 +80,7 @@ impl Open {
         Vec2::new(width as f32, height as f32)
     }
 
-    /// Frames what moves in the part of the window beside the panel.
+    /// Frames the moving bodies in the part of the window beside the panel.
     fn follow(&mut self, show: &dyn Panel) {
         let [width, height] = self.size().to_array();
         // The panel counts for at most half of the window.
@@ -92,7 +92,7 @@ impl Open {
         show.point(&self.pointer());
         match key {
             Key::Character('f') if down => self.eye.go_along(),
-            // A cube flies away, and a body that is missing moves the middle.
+            // A thrown cube flies away, and a removed body moves the center.
             Key::Character('b' | 'x') | Key::Delete if down => self.eye.stay(),
             Key::Character('h') if down => self.panel = !self.panel,
             _ => {}
@@ -131,7 +131,7 @@ impl Open {
         }
     }
 
-    /// Advances the time and draws; returns whether the window still exists.
+    /// Advances the time and draws. Returns whether the window still exists.
     pub(super) fn frame(&mut self, show: &mut dyn Panel) -> Result<bool> {
         let now = Instant::now();
         pollster::block_on(show.advance((now - self.last).as_secs_f32()))?;
@@ -163,13 +163,13 @@ impl Open {
             if panel {
                 let corner = ui.ctx().content_rect().right_top() + egui::vec2(-8.0, 8.0);
                 let window = egui::Window::new(show.title()).pivot(egui::Align2::RIGHT_TOP).default_pos(corner);
-                // A panel that is higher than the window scrolls.
+                // A panel that is taller than the window scrolls.
                 let most = ui.ctx().content_rect().height() - 64.0;
                 let shown = window.resizable(false).vscroll(true).max_height(most).show(ui.ctx(), |ui| show.panel(ui));
                 width = shown.map_or(0.0, |s| s.response.rect.width() * ui.ctx().pixels_per_point());
             }
         });
-        // The first frame gives the width of the panel.
+        // The width of the panel is known after the first frame.
         if width > 0.0 {
             self.panel_width = width;
         }

@@ -1,4 +1,4 @@
-//! Files of pictures: PNG, animated GIF, a folder of PNGs, or MP4 by ffmpeg.
+//! Picture files: PNG, animated GIF, a folder of PNGs, or MP4 by ffmpeg.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -9,10 +9,10 @@ use crate::files::Draft;
 use drystone::{Error, Result};
 use drystone_view::Picture;
 
-/// An open file or folder for pictures, which appears under its name with [`Output::finish`].
+/// An open file or folder for pictures. It appears under its name with [`Output::finish`].
 pub struct Output {
     path: PathBuf,
-    /// Dropped before the draft: the writer ends first.
+    /// Dropped before the draft, so that the writer ends first.
     kind: Kind,
     draft: Draft,
     size: (u32, u32),
@@ -32,7 +32,7 @@ struct Ffmpeg(Child);
 
 impl Drop for Ffmpeg {
     fn drop(&mut self) {
-        // Fails if the process has ended.
+        // This fails if the process has already ended.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -45,8 +45,8 @@ impl Output {
         if path.file_name().is_some() && (known || is_folder(path)) { Ok(()) } else { Err(unknown(path)) }
     }
 
-    /// Opens `path` for pictures of `size` with `rate` pictures per second. The path ends in `.png`, `.gif`, `.mp4`, or a slash for a
-    /// folder of numbered PNGs.
+    /// Opens `path` for pictures of `size` with `rate` pictures per second. The path ends in `.png`, `.gif` or `.mp4`,
+    /// or in a slash for a folder of numbered PNGs.
     pub fn open(path: &Path, size: (u32, u32), rate: f64) -> Result<Self> {
         Self::check(path)?;
         let draft = Draft::of(path)?;
@@ -65,7 +65,7 @@ impl Output {
                 Kind::Gif(Box::new(encoder))
             }
             Some("mp4") => {
-                // A path that cannot be written is an error before ffmpeg starts.
+                // Report a path that cannot be written before ffmpeg starts.
                 drop(draft.create()?);
                 Kind::Mp4(ffmpeg(draft.place(), size, rate)?)
             }

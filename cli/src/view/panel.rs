@@ -1,4 +1,4 @@
-//! The panel beside a show: for a scene measurements, controls and settings.
+//! The panel beside a show. For a scene it has measurements, controls and settings.
 
 use drystone::backend::BackendChoice;
 use drystone::config::Friction;
@@ -61,7 +61,7 @@ fn keys(ui: &mut egui::Ui) {
 fn numbers(live: &mut Live, ui: &mut egui::Ui) {
     let asleep = live.stats.asleep;
     let depth = live.simulation.solved_penetration();
-    // The manifolds of sleeping bodies are not in the statistics of the step.
+    // The statistics of the step do not contain the manifolds of sleeping bodies.
     let (manifolds, points, colors) = live.simulation.manifolds().fold((0, 0, 0), |(manifolds, points, colors), m| {
         (manifolds + 1, points + m.points().len(), colors.max(m.color.map_or(0, |c| c + 1)))
     });

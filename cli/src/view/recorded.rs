@@ -1,4 +1,4 @@
-//! The motion in a CSV file of `drystone run --out` as a film.
+//! Plays the motion in a CSV file of `drystone run --out` as a film.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use drystone::glam::{Quat, Vec3};
 use drystone::{BodyKind, Error, Result, Scene};
 use drystone_view::{ColorBy, Film};
 
-/// Step, time, body, center of mass, rotation and velocities, as [`crate::report::Trajectory`] writes them.
+/// Step, time, body, center of mass, rotation and velocities, in the format of [`crate::report::Trajectory`].
 type Row = (u32, f64, usize, [f32; 3], [f32; 4], [f32; 3], [f32; 3]);
 
 /// A film of `scene` with the motion in the file `path`.

@@ -76,7 +76,7 @@ impl ApplicationHandler for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // The window must be dropped before the event loop.
+        // Drop the window before the event loop.
         self.open = None;
     }
 }

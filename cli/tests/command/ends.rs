@@ -101,7 +101,7 @@ fn a_command_ends_when_nobody_reads_what_it_prints() {
         let (line, code) = last(&child.wait_with_output().expect("it ends"));
         assert_eq!(
             (line.as_str(), code),
-            ("drystone: nobody reads standard output any more", Some(141)),
+            ("drystone: the reader of standard output is gone", Some(141)),
             "{arguments}"
         );
     }
@@ -116,7 +116,7 @@ fn a_command_ends_when_nobody_reads_what_it_prints() {
     let mut child = folder.drystone("run drop --steps 2 --out motion.csv").spawn().expect("the command starts");
     drop(child.stdout.take());
     let (line, _) = last(&child.wait_with_output().expect("it ends"));
-    assert_eq!(line, "drystone: nobody reads standard output any more; kept motion.csv");
+    assert_eq!(line, "drystone: the reader of standard output is gone; kept motion.csv");
 }
 
 #[cfg(target_os = "linux")]
@@ -258,7 +258,8 @@ fn a_report_that_is_stopped_says_so_and_goes_on() {
     let child = folder.drystone(all).spawn().expect("the command starts");
     let output = stopped(child, "TERM", || folder.path("report/scenes.csv").exists());
     let (line, code) = last(&output);
-    let kept = "drystone: stopped by SIGTERM; kept report/scenes.csv; the same command goes on from report/scenes.csv";
+    let kept =
+        "drystone: stopped by SIGTERM; kept report/scenes.csv; the same command continues from report/scenes.csv";
     assert_eq!((line.as_str(), code), (kept, Some(143)));
     let first = folder.read("report/scenes.csv");
     assert!(

@@ -79,7 +79,7 @@ fn bad_input_ends_in_one_line_that_names_the_file_and_nothing_is_written() {
         ("export tower --fclib out.hdf5", &["tower", "--step N"]),
         ("export twoer --step 3 --fclib out.hdf5", &["twoer", "neither a scene"]),
         ("export chain --step 3 --fclib out.hdf5", &["chain, step 3", "joints"]),
-        ("export sphere-plane --step 1 --fclib out.hdf5", &["sphere-plane, step 1: nothing touches"]),
+        ("export sphere-plane --step 1 --fclib out.hdf5", &["sphere-plane, step 1: no awake body touches another"]),
         ("solve torn.hdf5", &["torn.hdf5: not a whole HDF5 file"]),
     ] {
         refused(folder.path(), arguments, named);
@@ -131,7 +131,7 @@ fn a_problem_without_bodies_is_solved_in_double_precision_and_refused_on_lanes_a
         ("solve ball.hdf5 --backend gpu", &["has no bodies", "gpu does not"]),
         ("solve ball.hdf5 --order manifolds", &["has no bodies", "by contacts"]),
         ("solve rolling.hdf5", &["rolling.hdf5: fclib_local_rolling: rolling friction cannot be read"]),
-        ("export ball.hdf5 --fclib out.hdf5", &["ball.hdf5: fclib_local: has no bodies, and bodies are needed"]),
+        ("export ball.hdf5 --fclib out.hdf5", &["ball.hdf5: fclib_local: has no bodies, but bodies are needed"]),
     ] {
         refused(folder.path(), arguments, named);
     }

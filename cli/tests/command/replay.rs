@@ -39,7 +39,7 @@ fn a_recorded_run_goes_the_same_way_again() {
     bytes[middle] ^= 1;
     std::fs::write(at.join("bad.rec"), bytes).expect("a file");
     let line = refusal(at, "replay bad.rec");
-    assert!(line.starts_with("drystone: bad.rec: a recording that cannot be replayed: "), "{line}");
+    assert!(line.starts_with("drystone: bad.rec: the recording cannot be replayed: "), "{line}");
     assert!(refusal(at, "replay drum.rec --from 41").contains("ends after step 40"));
     assert!(refusal(at, "run drum --steps 2 --record missing/drum.rec").contains("missing/drum.rec"));
     assert!(!at.join("missing").exists());

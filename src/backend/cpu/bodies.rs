@@ -1,4 +1,4 @@
-//! Bodies of the lanes: their states, and the passes over them.
+//! The states of bodies for the lanes, and the passes over bodies.
 
 #![allow(unsafe_code)]
 
@@ -16,7 +16,7 @@ use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{BodyRow, Params, StepProblem, Substep, TorqueRow};
 
-/// The state of a body, and the mass that acts in sweeps.
+/// The state of a body, and its mass in sweeps.
 #[derive(Clone, Copy, Default)]
 #[repr(C)]
 pub(super) struct State {
@@ -28,13 +28,13 @@ pub(super) struct State {
     pub mass: Row8,
 }
 
-/// Where a body's state begins, in units of 8 bytes.
+/// The offset of a body's state, in units of 8 bytes.
 pub(super) fn place(body: usize) -> u32 {
     u32::try_from(body * size_of::<State>() / 8).expect("fewer than 268 million bodies")
 }
 
 impl State {
-    /// As the body of a kernel.
+    /// Converts to the body of a kernel.
     #[inline(always)]
     pub fn load(&self) -> Body<f32> {
         body(self.velocity.0, self.movement.0)
@@ -61,7 +61,7 @@ fn velocity_numbers<L: Lane>(v: Vec3<L>, w: Vec3<L>) -> [L; 8] {
     [v.x, v.y, v.z, zero, w.x, w.y, w.z, zero]
 }
 
-/// Takes over some bodies of a problem. Each task has its own bodies, here and below.
+/// Loads some bodies of a problem. Each task has its own bodies, here and below.
 pub(super) fn load_bodies(
     problem: &StepProblem,
     slots: &[u32],
@@ -84,7 +84,7 @@ pub(super) fn load_bodies(
     }
 }
 
-/// Gives some bodies back.
+/// Stores some bodies.
 pub(super) fn store_bodies(states: &[State], slots: &[u32], range: Range<usize>, rows: &Shared<BodyRow>) {
     for i in range {
         let State { velocity, movement, .. } = &states[slots[i] as usize];
@@ -100,7 +100,7 @@ pub(super) struct BodyWork<'a> {
     pub params: &'a Params,
     pub substep: &'a Substep,
     pub bodies: Shared<'a, State>,
-    /// v . w . of each without the impulses of the substep, or when the step began.
+    /// v . w . of each body: without the impulses of the substep, or at the start of the step.
     pub free: Shared<'a, Row8>,
     /// Acceleration, then angular acceleration.
     pub accelerations: &'a [Row8],
@@ -162,7 +162,8 @@ impl Work for BodyWork<'_> {
     }
 }
 
-/// Turns the inertia of some bodies of systems of joints, given with their slots when the step begins.
+/// Rotates the inertia of some bodies in systems of joints. The list has their slots, and their inertia at the start of
+/// the step.
 pub(super) struct TurningWork<'a> {
     pub rows: &'a [(u32, Row8)],
     pub bodies: Shared<'a, State>,
@@ -178,7 +179,7 @@ impl Work for TurningWork<'_> {
             for ((begin, place_of), (slot, row)) in begin.iter_mut().zip(&mut places).zip(rows) {
                 (*begin, *place_of) = (*row, place(*slot as usize));
             }
-            // SAFETY: the places are those of states, of which no other task has any; `NEIGHBORING_ROWS` are the places of the rows.
+            // SAFETY: the places are those of states that no other task has; `NEIGHBORING_ROWS` are the places of the rows.
             let (body, [xx, xy, xz, inv_mass, yy, yz, zz, zero]) = unsafe {
                 (wide_body::<L>(self.bodies.as_ptr(), &places), L::gathered(begin.as_ptr(), &NEIGHBORING_ROWS))
             };
@@ -192,7 +193,7 @@ impl Work for TurningWork<'_> {
     }
 }
 
-/// Turns the spins of some bodies with unequal moments of inertia, given with their slots.
+/// Rotates the spins of some bodies with unequal moments of inertia. The list has their slots.
 pub(super) fn integrate_spins(
     from_start: bool,
     (params, substep): (&Params, &Substep),
@@ -211,7 +212,7 @@ pub(super) fn integrate_spins(
     }
 }
 
-/// Extrapolates the velocities of some bodies, and keeps those before.
+/// Extrapolates the velocities of some bodies, and keeps the previous ones.
 pub(super) fn extrapolate_velocities(
     first: bool,
     factor: f32,
@@ -232,10 +233,10 @@ pub(super) fn extrapolate_velocities(
     }
 }
 
-/// The places of sixteen bodies that stand beside each other.
+/// The places of sixteen adjacent bodies.
 const NEIGHBORS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<State>() / 8) as u32);
 
-/// The places of sixteen rows that stand beside each other.
+/// The places of sixteen adjacent rows.
 const NEIGHBORING_ROWS: [u32; WIDTH] = lanes!(lane => (lane * size_of::<Row8>() / 8) as u32);
 
 /// Sixteen bodies at the given places.
@@ -254,7 +255,7 @@ pub(super) unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WI
 /// The masses of sixteen bodies at the given places.
 ///
 /// # Safety
-/// As of [`wide_body`].
+/// Those of [`wide_body`].
 #[inline(always)]
 pub(super) unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Mass<L> {
     // SAFETY: the caller's promise.
@@ -262,10 +263,10 @@ pub(super) unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WI
     Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
 }
 
-/// The velocities of sixteen bodies when the step began, beside their states at the given places.
+/// The velocities of sixteen bodies at the start of the step, in rows at the places of their states.
 ///
 /// # Safety
-/// As of [`wide_body`], and `free` has a row for each state.
+/// Those of [`wide_body`], and `free` has a row for each state.
 #[inline(always)]
 pub(super) unsafe fn wide_start<L: Lanes>(free: *const Row8, places: &[u32; WIDTH], mass: &Mass<L>) -> Free<L> {
     const ROWS: u32 = (size_of::<State>() / size_of::<Row8>()) as u32;

@@ -1,4 +1,4 @@
-//! Contacts and joints as lanes see them, and the kernels over one of either.
+//! Contacts and joints in the layout of the lanes, and the kernels over one constraint.
 
 use std::ops::Range;
 
@@ -11,14 +11,15 @@ use crate::math::{Lane, Vec3};
 use crate::plan::Kernel;
 use crate::problem::{Block, ContactRow, JointRow, MOST_AXES, StepProblem};
 
-/// Most impulses of a constraint, but for the patch: those of a joint and its axes.
+/// Largest number of impulses of a constraint without the patch: a joint and its axes.
 pub(super) const MOST_IMPULSES: usize = 1 + MOST_AXES;
 
 /// A kind of constraint: contacts or joints.
 pub(super) trait Constraint: bytemuck::Pod + Sync {
-    /// Whether its rows of impulses and of points stand together, the first of them with the first.
+    /// Whether its points are stored like its impulses, so that both begin at the same index.
     const HAS_POINTS: bool;
-    /// Which numbers of its row stand in lanes, in the order of the kernels' struct; the last of a joint is padding.
+    /// Indices of the row's numbers that the lanes hold, in the order of the kernels' struct. The last one of a joint
+    /// is padding.
     const HEADER: [usize; 11];
     fn colors(problem: &StepProblem) -> Range<u32>;
     fn own_colors(block: &Block) -> Range<u32>;
@@ -26,13 +27,13 @@ pub(super) trait Constraint: bytemuck::Pod + Sync {
     fn impulses(problem: &StepProblem) -> &[[f32; 4]];
     fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]);
     fn bodies(&self) -> [u32; 2];
-    /// Contact points, 1 to 4; of a joint its anchors and its axes.
+    /// Number of contact points, 1 to 4; for a joint, its anchors and its axes.
     fn points(&self) -> u32;
-    /// The row of its impulse `k`; `row` is its own row, one of `rows`.
+    /// The row of its impulse `k`. `row` is the constraint's own row in `rows`.
     fn impulse(rows: &[Self], row: u32, k: usize) -> usize;
     /// Whether lanes hold points of the rows of a problem.
     fn are_with_points(problem: &StepProblem) -> bool;
-    /// The numbers of the point, or of the axis, of its impulse `k`.
+    /// The numbers of the point, or of the axis, for its impulse `k`.
     fn point<'a>(&self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]>;
 }
 
@@ -74,7 +75,7 @@ impl Constraint for ContactRow {
 
 impl Constraint for JointRow {
     const HAS_POINTS: bool = false;
-    /// Arms, gap, whether the anchors are loose.
+    /// Arms, gap, and whether the anchors are free.
     const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 15];
     fn colors(problem: &StepProblem) -> Range<u32> {
         problem.joint_colors()
@@ -108,7 +109,7 @@ impl Constraint for JointRow {
     }
 }
 
-/// Applies a kernel to a contact of a lane; `as_one` is that of [`Kernel::presses_as_one`].
+/// Applies a kernel to a contact of a lane. `as_one` is the value of [`Kernel::presses_as_one`].
 #[inline(always)]
 pub(super) fn sweep_contact<L: Lane>(
     kernel: Kernel,
@@ -126,7 +127,7 @@ pub(super) fn sweep_contact<L: Lane>(
     }
 }
 
-/// The axes of a joint and their impulses, wherever they stand.
+/// Access to the axes of a joint and their impulses, in any storage.
 pub(super) trait AxisRows<L> {
     fn count(&self) -> usize;
     fn axis(&self, k: usize) -> Axis<L>;
@@ -149,7 +150,8 @@ impl<L: Lane> AxisRows<L> for (&[Axis<L>], &mut [Vec3<L>]) {
     }
 }
 
-/// Applies a kernel to a joint of a lane and its axes, and to their impulses; where it is solved at once with others, to their corrections.
+/// Applies a kernel to a joint of a lane, its axes and their impulses. If a system solves the joint, the kernel applies
+/// to their corrections.
 #[inline(always)]
 pub(super) fn sweep_joint<L: Lane>(
     kernel: Kernel,
@@ -160,7 +162,7 @@ pub(super) fn sweep_joint<L: Lane>(
     axes: &mut impl AxisRows<L>,
 ) {
     match kernel {
-        // Corrections are applied as impulses are that a joint carries.
+        // Corrections are applied like warm-start impulses.
         Kernel::WarmStartJoints { axes: has_axes } | Kernel::ApplyJointChanges(Rules { axes: has_axes, .. }) => {
             if has_axes {
                 for k in 0..axes.count() {

@@ -1,4 +1,5 @@
-//! Joints that are solved at once, on the states of the lanes: sixteen systems of one form side by side, or one alone.
+//! Direct solution of joint systems on the states of the lanes: sixteen systems of equal structure side by side, or one
+//! alone.
 
 #![allow(unsafe_code)]
 
@@ -16,16 +17,17 @@ use crate::lanes::{Lanes, Portable, Shared, WIDTH, Wide, Work, lanes};
 use crate::math::{Lane, Vec3, vec3};
 use crate::problem::{AxisRow, JointRow, JointSystems, StepProblem};
 
-/// Fewer systems of one form are solved one after another: the numbers of a column of one system fill a quarter of the lanes.
+/// With fewer systems of equal structure, they are solved one after another: a column of one system fills a quarter of
+/// the lanes.
 const LEAST_SIDE_BY_SIDE: usize = 4;
 
-/// One system, or several of one form.
+/// One system, or several of equal structure.
 #[derive(Clone, Copy)]
 struct SystemGroup {
-    /// The systems, one a lane; lanes that are left have the first one again.
+    /// The systems, one for each lane. Unused lanes repeat the first one.
     systems: [u32; WIDTH],
     count: usize,
-    /// Where its nodes and blocks are among those of all groups that are solved side by side.
+    /// The start of its nodes and blocks among those of all groups that are solved side by side.
     first_node: usize,
     first_block: usize,
 }
@@ -50,7 +52,7 @@ pub(super) struct SystemLayout {
 }
 
 impl SystemLayout {
-    /// Takes over the systems of a problem, and makes room for their factors.
+    /// Loads the systems of a problem, and makes room for their factors.
     pub fn load(
         &mut self,
         problem: &StepProblem,
@@ -95,7 +97,7 @@ impl SystemLayout {
             let is_like = |group: &&mut SystemGroup| {
                 group.count < WIDTH && systems.are_of_one_form([group.systems[0], system].map(|system| system as usize))
             };
-            // Neighbors are most alike.
+            // Neighbors are most similar.
             match self.groups[first..].iter_mut().rev().find(is_like) {
                 Some(group) => {
                     group.systems[group.count] = system;
@@ -113,7 +115,7 @@ impl SystemLayout {
         }
     }
 
-    /// Where the groups of each color of each part stand: places for [`SystemWork`].
+    /// The groups of each color of each part: places for [`SystemWork`].
     pub fn ranges(&self) -> &ColorRanges {
         &self.ranges
     }
@@ -123,14 +125,14 @@ impl SystemLayout {
 #[derive(Default)]
 pub(super) struct SystemsFactors {
     alone: JointFactors<f32>,
-    /// Of systems that are solved side by side, number by number.
+    /// For systems that are solved side by side, one number at a time.
     nodes: Vec<Wide>,
     lower: Vec<Wide>,
     upper: Vec<Wide>,
 }
 
 impl SystemsFactors {
-    /// Makes room for all systems alone, and for so many nodes and blocks of systems side by side.
+    /// Makes room for all systems that are solved alone, and for these numbers of nodes and blocks side by side.
     fn reset(&mut self, systems: &JointSystems, nodes: usize, blocks: usize) {
         self.alone.reset(systems);
         self.nodes.resize(nodes * numbers_in::<JointNode<Portable>>(), Wide::default());
@@ -139,13 +141,13 @@ impl SystemsFactors {
     }
 }
 
-/// How many numbers of sixteen lanes a value has that consists of nothing else.
+/// The number of sixteen-lane numbers in a value that consists only of them.
 const fn numbers_in<T>() -> usize {
     assert!(size_of::<T>().is_multiple_of(size_of::<Wide>()) && align_of::<T>() <= align_of::<Wide>());
     size_of::<T>() / size_of::<Wide>()
 }
 
-/// The factors of all systems, shared by threads that have different systems.
+/// The factors of all systems, shared by threads with different systems.
 #[derive(Clone, Copy)]
 pub(super) struct SharedFactors<'a> {
     nodes: Shared<'a, JointNode<f32>>,
@@ -220,7 +222,7 @@ unsafe fn as_lanes<'a, T>(numbers: &Shared<'a, Wide>, range: Range<usize>) -> &'
 
 /// A pass over groups of systems.
 pub(super) struct SystemWork<'a> {
-    /// Whether systems begin, and are not solved.
+    /// Whether the pass sets systems up, in place of solving them.
     pub begins: bool,
     pub problem: &'a StepProblem,
     pub layout: &'a SystemLayout,
@@ -262,7 +264,7 @@ impl SystemWork<'_> {
         }
     }
 
-    /// The number of the row of a node of the problem, among corrections or impulses.
+    /// The number in the row of a node of the problem, among corrections or impulses.
     ///
     /// SAFETY: `check` holds that a joint is in one system, and tasks have different systems.
     #[inline(always)]

@@ -4,40 +4,40 @@ use std::ops::Range;
 
 use crate::lanes::{WIDTH, Wide};
 
-/// Sixteen constraints of one color with as many impulses each.
+/// Sixteen constraints of one color with the same number of impulses.
 #[derive(Clone, Copy, Default)]
 pub(super) struct LaneGroup {
     pub a: BodyLanes,
     pub b: BodyLanes,
-    /// Rows of the problem, one a lane; `NO_ROW` for a lane without a constraint.
+    /// Rows of the problem, one for each lane; `NO_ROW` for an empty lane.
     pub rows: [u32; WIDTH],
     pub header: [Wide; 11],
-    /// The first of its impulses, and of its points.
+    /// The index of its first impulse, and of its first point.
     pub first: u32,
-    /// Impulses; one of them is the patch, if there are patches.
+    /// Number of impulses, including the patch if there are patches.
     pub count: u32,
 }
 
-/// The row of a lane without a constraint.
+/// The row of an empty lane.
 pub(super) const NO_ROW: u32 = u32::MAX;
 
 /// Sixteen bodies.
 #[derive(Clone, Copy, Default)]
 pub(super) struct BodyLanes {
-    /// Where their states are.
+    /// The places of their states.
     pub places: [u32; WIDTH],
-    /// Which of them can move, a bit a lane.
+    /// The movable ones, one bit for each lane.
     pub movable: u16,
 }
 
 impl LaneGroup {
-    /// Where its impulses are.
+    /// The indices of its impulses.
     #[inline(always)]
     pub fn impulses(&self) -> Range<usize> {
         self.first as usize..(self.first + self.count) as usize
     }
 
-    /// Whether every lane has a constraint; lanes are filled from the first.
+    /// Whether every lane has a constraint. Lanes are filled from the first.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.rows[WIDTH - 1] != NO_ROW

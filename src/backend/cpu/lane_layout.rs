@@ -1,4 +1,4 @@
-//! Constraints in groups of sixteen lanes: from the rows of a problem, and back.
+//! Converts the rows of a problem to groups of sixteen lanes, and back.
 
 #![allow(unsafe_code)]
 
@@ -17,21 +17,21 @@ use crate::lanes::{InstructionSet, Lanes, Portable, Shared, WIDTH};
 use crate::math::Lane;
 use crate::problem::StepProblem;
 
-/// The place of the impulse of a joint among the lanes.
+/// The place of the impulse of a joint in the lanes.
 #[derive(Clone, Copy, Default)]
 pub(super) struct ImpulsePlace {
-    /// Its sixteen impulses.
+    /// The index of its sixteen impulses.
     pub row: u32,
-    /// Its number among them.
+    /// Its lane.
     pub lane: u32,
 }
 
-/// The numbers of a step that only some passes use.
+/// The optional numbers of a step that some passes use.
 #[derive(Clone, Copy)]
 pub(super) struct Uses {
     /// Largest impulses of points.
     pub peaks: bool,
-    /// Velocities of approach and slips of points.
+    /// Approach velocities and slips of points.
     pub approach_or_slip: bool,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct LaneLayout<C> {
     /// The groups of each color of each part.
     pub ranges: ColorRanges,
     rows: PartitionedRows,
-    /// Constraints of each color of each part by their numbers of points, and its first group and impulse.
+    /// For each color of each part: the number of constraints by number of points, and its first group and impulse.
     counts: Vec<[usize; MOST_IMPULSES]>,
     firsts: Vec<(usize, u32)>,
     /// State of accelerated sweeps.
@@ -51,7 +51,7 @@ pub(super) struct LaneLayout<C> {
 }
 
 impl<C: Constraint> LaneLayout<C> {
-    /// Takes over the constraints of a problem and their impulses, as far as passes use them.
+    /// Loads the constraints of a problem and the impulses that passes use.
     pub fn load(
         &mut self,
         problem: &StepProblem,
@@ -77,7 +77,7 @@ impl<C: Constraint> LaneLayout<C> {
         threads.spread(0..len, &|range| instructions.run(&work, range));
     }
 
-    /// Gives the impulses back.
+    /// Stores the impulses in the problem.
     pub fn store(
         &self,
         problem: &mut StepProblem,
@@ -88,7 +88,7 @@ impl<C: Constraint> LaneLayout<C> {
         self.store_to(rows, impulses, to, (instructions, threads));
     }
 
-    /// Takes over sums of impulses, sixteen side by side as the impulses are.
+    /// Loads sums of impulses, in the layout of the impulses.
     pub fn load_sums(&self, problem: &StepProblem, from: &[[f32; 4]], sums: &mut LaneImpulses, threads: &Threads) {
         sums.resize(self.groups.last().map_or(0, |group| group.impulses().end), true);
         let (rows, sums) = (C::rows(problem), sums.shared());
@@ -105,7 +105,7 @@ impl<C: Constraint> LaneLayout<C> {
         });
     }
 
-    /// Gives impulses, or their sums, back to the rows of the constraints `rows`.
+    /// Stores impulses, or their sums, in the rows of the constraints `rows`.
     pub fn store_to(
         &self,
         rows: &[C],
@@ -132,7 +132,7 @@ impl<C: Constraint> LaneLayout<C> {
         });
     }
 
-    /// Measures how far the last sweep moved each impulse of the problem.
+    /// Measures the change of each impulse of the problem in the last sweep.
     pub fn measure_step(
         &self,
         problem: &StepProblem,
@@ -156,8 +156,8 @@ impl<C: Constraint> LaneLayout<C> {
         });
     }
 
-    /// Groups the constraints of each color of each part by their number of points. Groups stand in the order of their first rows, so
-    /// that neighbors in the world stay neighbors.
+    /// Groups the constraints of each color of each part by their number of points. Groups are in the order of their
+    /// first rows, so that neighbors in the world stay neighbors.
     fn make_groups(&mut self, problem: &StepProblem, partition: &Partition, threads: &Threads) {
         let (all, colors) = (C::rows(problem), C::colors(problem));
         self.ranges.reset(colors.clone());
@@ -165,7 +165,7 @@ impl<C: Constraint> LaneLayout<C> {
             let [a, b] = all[row as usize].bodies();
             partition.of(a, b)
         });
-        // Patches stand in the problem whether a pass asks for them or not.
+        // The problem has patches, whether a pass uses them or not.
         let patch = u32::from(C::HAS_POINTS && problem.has_patches());
         let kind_of = |row: u32| all[row as usize].points() as usize - 1;
         let (rows, cells) = (&self.rows, self.rows.ranges.len());
@@ -195,7 +195,7 @@ impl<C: Constraint> LaneLayout<C> {
         threads.spread_each(0..cells, &|range| {
             for cell in range {
                 let (mut next, mut next_impulse) = firsts[cell];
-                // For each number of points the group with free lanes, and the lanes taken so far.
+                // For each number of points: the group with free lanes, and the number of used lanes.
                 let (mut open, mut taken) = ([0; MOST_IMPULSES], [0; MOST_IMPULSES]);
                 for &row in rows.at(cell) {
                     let kind = kind_of(row);

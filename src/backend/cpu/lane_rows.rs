@@ -1,7 +1,8 @@
-//! Points and impulses of the lanes, apart by the sweeps that use them: a sweep streams what it reads and no more.
+//! Points and impulses of the lanes, separated by use: a sweep streams only the numbers that it reads.
 //!
-//! A biased sweep without friction reads the first eight numbers of a point and its normal impulse; friction reads one number more and the two
-//! impulses along the tangents. Velocities of approach, slips and largest impulses stand in the lanes only where a pass uses them.
+//! A biased sweep without friction reads the first eight numbers of a point and its normal impulse. Friction reads one
+//! more number and the two tangential impulses. The lanes hold approach velocities, slips and largest impulses only if
+//! a pass uses them.
 
 #![allow(unsafe_code)]
 
@@ -13,7 +14,7 @@ use crate::kernels::{Axis, Impulse, Point};
 use crate::lanes::{Lanes, Shared, Wide};
 use crate::math::{Vec3, vec3};
 
-/// Lanes of some numbers, without a closure: a closure would be compiled for the plain instruction set.
+/// Loads lanes without a closure: a closure would be compiled for the plain instruction set.
 macro_rules! loaded {
     ($numbers:expr; $($i:literal)*) => {{
         let numbers = $numbers;
@@ -21,24 +22,24 @@ macro_rules! loaded {
     }};
 }
 
-/// The numbers of points, or of the axes of joints, by the order of their rows.
+/// The numbers of points, or of the axes of joints, in the order of their rows.
 #[derive(Default)]
 pub(super) struct LanePoints {
     /// Arms, separation, normal mass; the first eight numbers of an axis.
     pub arms: Vec<[Wide; 8]>,
     /// Tangent mass; the ninth number of an axis.
     pub tangent_masses: Vec<Wide>,
-    /// Velocity of approach and slip; the last three numbers of an axis. Empty where no pass reads them.
+    /// Approach velocity and slip; the last three numbers of an axis. Empty if no pass reads them.
     pub others: Vec<[Wide; 3]>,
 }
 
-/// Impulses, by the order of their rows.
+/// Impulses, in the order of their rows.
 #[derive(Default)]
 pub(super) struct LaneImpulses {
     pub normals: Vec<Wide>,
     /// Along both tangents.
     pub tangents: Vec<[Wide; 2]>,
-    /// The largest along the normal; empty where no pass keeps them.
+    /// The largest normal impulses; empty if no pass keeps them.
     pub peaks: Vec<Wide>,
 }
 
@@ -58,7 +59,7 @@ impl LanePoints {
         }
     }
 
-    /// Bytes that a sweep with friction or without reads; both leave the last numbers alone.
+    /// Bytes that a sweep reads, with or without friction. No sweep reads the last numbers.
     pub fn bytes(&self, has_friction: bool) -> usize {
         size_of_val(&self.arms[..]) + if has_friction { size_of_val(&self.tangent_masses[..]) } else { 0 }
     }
@@ -88,7 +89,7 @@ impl LaneImpulses {
         vec3(L::load(&self.normals[i]), L::load(&self.tangents[i][0]), L::load(&self.tangents[i][1]))
     }
 
-    /// Bytes that a sweep with friction or without reads and writes.
+    /// Bytes that a sweep reads and writes, with or without friction.
     pub fn bytes(&self, has_friction: bool) -> usize {
         size_of_val(&self.normals[..]) + if has_friction { size_of_val(&self.tangents[..]) } else { 0 }
     }
@@ -96,7 +97,7 @@ impl LaneImpulses {
 
 const ZERO: Wide = Wide([0.0; crate::lanes::WIDTH]);
 
-/// Points, shared by threads that have different ones.
+/// Points, shared by threads with different ones.
 #[derive(Clone, Copy)]
 pub(super) struct SharedPoints<'a> {
     arms: Shared<'a, [Wide; 8]>,
@@ -104,7 +105,7 @@ pub(super) struct SharedPoints<'a> {
     others: Shared<'a, [Wide; 3]>,
 }
 
-/// Impulses, shared likewise.
+/// Impulses, shared by threads with different ones.
 #[derive(Clone, Copy)]
 pub(super) struct SharedImpulses<'a> {
     normals: Shared<'a, Wide>,
@@ -134,7 +135,7 @@ impl<'a> SharedImpulses<'a> {
     /// Some impulses, to write in place.
     ///
     /// # Safety
-    /// As of points.
+    /// Those of [`SharedPoints::slice`].
     #[inline(always)]
     pub unsafe fn slice(&self, range: Range<usize>) -> OwnImpulses<'a> {
         // SAFETY: the caller's promise.
@@ -162,7 +163,7 @@ impl<'a> SharedImpulses<'a> {
     }
 }
 
-/// The range, or none where nothing stands.
+/// The range, or an empty one if nothing is stored.
 #[inline(always)]
 fn present<T: Copy>(rows: &Shared<T>, range: &Range<usize>) -> Range<usize> {
     if rows.is_empty() { 0..0 } else { range.clone() }
@@ -226,7 +227,7 @@ impl OwnImpulses<'_> {
         self.impulse::<L>(k).components()
     }
 
-    /// Sixteen impulses; the largest are zero where no pass keeps them.
+    /// Sixteen impulses. The largest ones are zero if no pass keeps them.
     #[inline(always)]
     pub fn impulse<L: Lanes>(&self, k: usize) -> Impulse<L> {
         let [tangent_1, tangent_2] = loaded!(&self.tangents[k]; 0 1);
@@ -285,7 +286,7 @@ impl<L: Lanes> PointRows<L> for GroupRows<'_> {
     }
 }
 
-/// Those of a joint stand after its anchors.
+/// The axes of a joint come after its anchors.
 impl<L: Lanes> AxisRows<L> for GroupRows<'_> {
     #[inline(always)]
     fn count(&self) -> usize {

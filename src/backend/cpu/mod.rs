@@ -1,9 +1,11 @@
-//! The CPU backends: [`Reference`], one constraint at a time, and [`Cpu`], the same kernels over sixteen lanes and all threads.
+//! The CPU backends: [`Reference`] runs one constraint at a time, and [`Cpu`] runs the same kernels with sixteen lanes
+//! and all threads.
 //!
-//! Both run the same kernel text, over different lane types, so their results have the same bits. Contacts of one color and one number
-//! of points stand in groups of sixteen, lane by lane; contacts of a placeholder body fill the lanes that are left. The instruction
-//! set is chosen at run time. Color order makes the order inside a pass irrelevant, so a pass can be cut into as many tasks as there
-//! are threads. Where there are many islands, each thread runs all passes over some of them before it goes on (`partition.rs`).
+//! Both run the same kernel text over different lane types, so their results have the same bits. Contacts of one color
+//! with the same number of points form groups of sixteen, one for each lane. Contacts of a placeholder body fill the
+//! unused lanes. The instruction set is chosen at run time. The order inside a color does not matter, so a pass can be
+//! cut into as many tasks as there are threads. If there are many islands, each thread runs all passes over some of
+//! them before it takes the next (`partition.rs`).
 
 mod bodies;
 mod constraint;
@@ -43,15 +45,16 @@ use shared_step::{SharedStep, Spread};
 use threads::Threads;
 use transfer::BodyPlace;
 
-/// Bodies and constraints that are not worth dividing: about 20 MB. Of 128 and 256 worlds with a pile of 100 (51,000 and 102,000)
-/// a step took 0.87 and 0.60 of the time on one thread if divided, 1.1 and 0.75 on two; of 64 worlds 1.05 and 0.9.
+/// Number of bodies and constraints up to which division does not pay: about 20 MB. For 128 and 256 worlds with a pile
+/// of 100 (51,000 and 102,000), a divided step took 0.87 and 0.60 of the time on one thread, and 1.1 and 0.75 on two.
+/// For 64 worlds it took 1.05 and 0.9.
 const UNDIVIDED: usize = 60_000;
 
 /// The backend of the processor.
 #[derive(Default)]
 pub struct Cpu {
     instructions: InstructionSet,
-    /// Problems with fewer bodies and constraints are one part; [`UNDIVIDED`] if not given.
+    /// Problems with fewer bodies and constraints are one part; `None` means [`UNDIVIDED`].
     undivided: Option<usize>,
     partition: Partition,
     places: Vec<BodyPlace>,
@@ -70,32 +73,32 @@ pub struct Cpu {
     joint_impulses: LaneImpulses,
     /// Their sums over the substeps.
     joint_totals: LaneImpulses,
-    /// Joints that are solved at once: their places, factors and corrections.
+    /// Joints in systems: their places, factors and corrections.
     systems: SystemLayout,
     factors: SystemsFactors,
-    /// Inertia of their bodies when the step begins, in the order of slots.
+    /// Inertia of their bodies at the start of the step, in the order of slots.
     turning: Vec<(u32, Row8)>,
     joint_changes: LaneImpulses,
     convergence: ConvergenceRow,
     momentum: Momentum<f32>,
-    /// Velocities of the accelerated sweep before.
+    /// Velocities of the previous accelerated sweep.
     velocities_before: Vec<Row8>,
     lengths: Vec<StepLength<f32>>,
 }
 
 impl Cpu {
-    /// A backend on the best instruction set that the processor has.
+    /// A backend with the best instruction set of the processor.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A backend on each instruction set that the processor has, to compare: first on what every processor has, last the best.
+    /// A backend for each instruction set of the processor, for comparisons: the portable one first, the best one last.
     pub fn each() -> impl Iterator<Item = Self> {
         InstructionSet::each().map(|instructions| Self { instructions, ..Self::default() })
     }
 
-    /// The same, but problems of more than `size` bodies and constraints are divided into parts that fit in a core's cache, if they
-    /// have small islands. No result depends on `size`.
+    /// The same, but a problem with small islands and more than `size` bodies and constraints is divided into parts
+    /// that fit into a core's cache. No result depends on `size`.
     pub fn dividing_above(self, size: usize) -> Self {
         Self { undivided: Some(size), ..self }
     }
@@ -129,7 +132,7 @@ impl Cpu {
             let totals = bytemuck::cast_slice(&problem.totals);
             self.contacts.load_sums(problem, totals, &mut self.contact_totals, threads);
         }
-        // The last numbers of axes stand where those of points do.
+        // The last numbers of axes are stored in the places of those of points.
         let uses = Uses { peaks: false, approach_or_slip: true };
         let rows = (&mut self.joint_axes, &mut self.joint_impulses);
         self.joints.load(problem, &self.partition, &self.places, rows, uses, on);
@@ -171,14 +174,14 @@ impl Cpu {
         problem.momentum = self.momentum.store();
     }
 
-    /// Runs neighboring passes that all stay on islands, or one that does not.
+    /// Runs consecutive passes that all stay on islands, or one that does not.
     fn run_passes(&mut self, problem: &StepProblem, passes: &[Pass], threads: &Threads) {
         match passes[0].kernel {
             Kernel::BeginSweep { first } => begin_sweep(first, &mut self.convergence),
             Kernel::Extrapolate { measured: true, .. } if self.convergence.done != 0 => {}
             Kernel::Extrapolate { first, .. } => self.extrapolate(first, threads),
             Kernel::MeasureStep => {
-                // Rows that take no part do not move.
+                // Rows that are not part of the sweep do not move.
                 reset(&mut self.lengths, problem.impulse_count());
                 let (contacts, joints) = self.lengths.split_at_mut(problem.impulses.len());
                 self.contacts.measure_step(problem, &self.contact_impulses, contacts, threads);
@@ -189,7 +192,7 @@ impl Cpu {
         }
     }
 
-    /// Small islands part by part, from the first of the passes to the last, then large ones pass by pass.
+    /// Runs small islands part by part, from the first pass to the last, then large islands pass by pass.
     fn run_on_islands(&mut self, problem: &StepProblem, passes: &[Pass], threads: &Threads) {
         let moving = AtomicBool::new(false);
         let shared = SharedStep {
@@ -249,18 +252,18 @@ impl Cpu {
     }
 }
 
-/// So many default values.
+/// Fills a list with `len` default values.
 fn reset<T: Clone + Default>(rows: &mut Vec<T>, len: usize) {
     rows.clear();
     rows.resize(len, T::default());
 }
 
-/// Spreads work over bodies, sixteen of them as one.
+/// Spreads work over bodies, in groups of sixteen.
 fn in_groups(bodies: usize, threads: &Threads, work: &(dyn Fn(Range<usize>) + Sync)) {
     threads.spread(0..bodies.div_ceil(WIDTH), &|groups| work(WIDTH * groups.start..bodies.min(WIDTH * groups.end)));
 }
 
-/// Whether what a kernel does to an island depends on no other.
+/// Whether the effect of a kernel on an island does not depend on other islands.
 fn stays_on_islands(kernel: Kernel) -> bool {
     use Kernel::{BeginSweep, Extrapolate, MeasureStep, UpdateMomentum};
     !matches!(kernel, BeginSweep { .. } | Extrapolate { .. } | MeasureStep | UpdateMomentum)

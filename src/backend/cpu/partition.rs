@@ -1,10 +1,10 @@
-//! The partition of bodies and constraints into parts, each for one thread.
+//! Divides bodies and constraints into parts, each for one thread.
 //!
-//! Islands do not depend on each other. So small islands fill parts that fit in a core's cache, and a thread runs all passes over a
-//! part before it takes the next: rows and bodies are fetched once a step and not once a pass, and no thread waits. After these parts
-//! each block has one for its larger islands; all threads work on it together, color by color. Bodies that no pass changes are in the
-//! last part. Every body and every constraint gets the same passes in the same order, so the result has the same bits for every
-//! partition.
+//! Islands do not depend on each other. Small islands fill parts that fit into a core's cache, and a thread runs all
+//! passes over a part before it takes the next: rows and bodies are fetched once a step instead of once a pass, and no
+//! thread waits. After these parts, each block has one part for its larger islands. All threads work on it together,
+//! color by color. Bodies that no pass changes are in the last part. Every body and every constraint gets the same
+//! passes in the same order, so the result has the same bits for every partition.
 
 use std::ops::Range;
 
@@ -12,25 +12,25 @@ use crate::graph::Islands;
 use crate::lanes::WIDTH;
 use crate::problem::{Block, BodyRow, MassRow, StepProblem};
 
-/// Bodies and constraints that a part holds: about a megabyte.
+/// Number of bodies and constraints in a part: about a megabyte.
 const PART: u32 = 4096;
-/// Islands with more are worked on by all threads.
+/// All threads work together on islands with more than this.
 const LARGE: u32 = 4 * PART;
 
-/// The part of each body, and its place among the lanes.
+/// The part of each body, and its slot in the lanes.
 #[derive(Default)]
 pub(super) struct Partition {
     /// Number of parts.
     pub count: usize,
-    /// The block of each part for one thread. The parts for all threads follow, a block each.
+    /// The block of each part for one thread. The parts for all threads follow, one for each block.
     pub blocks: Vec<u32>,
-    /// The slot of each body, and last that of the placeholder: a body at rest for lanes without a constraint.
+    /// The slot of each body, then that of the placeholder: a body at rest for empty lanes.
     pub slots: Vec<u32>,
-    /// Where the bodies of each part begin, in groups of [`WIDTH`] slots, and where the last end.
+    /// The start of the bodies of each part, in groups of [`WIDTH`] slots, and the end of the last part.
     begins: Vec<u32>,
     of_body: Vec<u32>,
     islands: Islands,
-    /// Bodies and constraints of the island whose root each body is.
+    /// For the root body of each island: its number of bodies and constraints.
     sizes: Vec<u32>,
     /// The next slot of each part.
     next: Vec<u32>,
@@ -48,8 +48,8 @@ impl Partition {
             (0..problem.blocks.len()).for_each(|block| self.pack_islands(problem, block));
         }
         let first = self.blocks.len() as u32;
-        // Constraints of divided problems find their part by their bodies. Bodies that no pass changes are then in a part of their own, the
-        // last, unless one part is for all threads.
+        // In a divided problem, the bodies of a constraint determine its part. Bodies that no pass changes are in a
+        // part of their own, the last one, unless one part is for all threads.
         let resting = first + problem.blocks.len() as u32;
         let rest_apart = first > 0 && problem.blocks.len() > 1;
         self.count = if rest_apart { resting as usize + 1 } else { resting.max(1) as usize };
@@ -64,14 +64,14 @@ impl Partition {
         self.give_slots();
     }
 
-    /// Whether all parts are for all threads, a block each.
+    /// Whether all parts are for all threads, one for each block.
     pub fn is_undivided(&self) -> bool {
         self.blocks.is_empty()
     }
 
-    /// The part of a constraint of two bodies, in a divided problem.
+    /// The part of a constraint between two bodies, in a divided problem.
     pub fn of(&self, a: u32, b: u32) -> u32 {
-        // A body that cannot be pushed and has no part with what touches it is in the last part.
+        // A body that impulses cannot move, and that shares no part with its neighbors, is in the last part.
         self.of_body[a as usize].min(self.of_body[b as usize])
     }
 
@@ -122,7 +122,7 @@ impl Partition {
         }
     }
 
-    /// Bodies of different parts share no group. The placeholder, which all lanes read, has a group of its own.
+    /// Bodies of different parts share no group. All lanes read the placeholder, so it has its own group.
     fn give_slots(&mut self) {
         self.begins.clear();
         self.begins.resize(self.count + 1, 0);
@@ -143,7 +143,7 @@ impl Partition {
     }
 }
 
-/// The colors of a kind of all blocks.
+/// The colors of one kind in all blocks.
 fn own_colors(problem: &StepProblem, own: impl Fn(&Block) -> Range<u32>) -> Range<u32> {
     let ends = problem.blocks.first().zip(problem.blocks.last());
     ends.map_or(0..0, |(first, last)| own(first).start..own(last).end)
@@ -161,27 +161,27 @@ fn moves(problem: &StepProblem, body: u32) -> bool {
     inv_mass > 0.0 || acceleration != [0.0; 3] || problem.bodies[body as usize] != BodyRow::AT_REST
 }
 
-/// Ranges of a list that stands part by part, and color by color in each part.
+/// Ranges of a list that is sorted by part, then by color.
 #[derive(Default)]
 pub(super) struct ColorRanges {
     colors: Range<u32>,
-    /// Where each color of each part starts, and where the last ends.
+    /// The start of each color of each part, and the end of the last.
     starts: Vec<u32>,
 }
 
 impl ColorRanges {
-    /// Starts anew with some colors in each part.
+    /// Resets the ranges, with these colors in each part.
     pub fn reset(&mut self, colors: Range<u32>) {
         self.colors = colors;
         self.starts.clear();
     }
 
-    /// The next color of a part, or the end of the last, is at `start`.
+    /// Sets `start` as the start of the next color of a part, or as the end of the last.
     pub fn push(&mut self, start: usize) {
         self.starts.push(start as u32);
     }
 
-    /// How many colors all parts have together.
+    /// Total number of colors in all parts.
     pub fn len(&self) -> usize {
         self.starts.len() - 1
     }
@@ -197,7 +197,7 @@ impl ColorRanges {
     }
 }
 
-/// Rows of a problem, part by part and color by color.
+/// Rows of a problem, sorted by part, then by color.
 #[derive(Default)]
 pub(super) struct PartitionedRows {
     /// Part by part and color by color.
@@ -207,7 +207,8 @@ pub(super) struct PartitionedRows {
 }
 
 impl PartitionedRows {
-    /// Sorts the rows of some colors by part. `own` gives the colors of a block, `part_of` the part of a row of a divided problem.
+    /// Sorts the rows of some colors by part. `own` returns the colors of a block, and `part_of` returns the part of a
+    /// row of a divided problem.
     pub fn update(
         &mut self,
         problem: &StepProblem,
@@ -249,7 +250,7 @@ impl PartitionedRows {
         }
     }
 
-    /// The rows of the color of a part, by the index of its range.
+    /// The rows of a color of a part, by the index of its range.
     pub fn at(&self, i: usize) -> &[u32] {
         &self.rows[self.ranges.at(i)]
     }
@@ -260,7 +261,7 @@ mod tests {
     use super::*;
     use crate::problem::ContactRow;
 
-    /// Movable bodies, touching as said.
+    /// Movable bodies with these contacts.
     fn problem(bodies: usize, touching: impl Iterator<Item = (u32, u32)>) -> StepProblem {
         let mut problem = StepProblem {
             bodies: vec![BodyRow::AT_REST; bodies],

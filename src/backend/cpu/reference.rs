@@ -1,4 +1,4 @@
-//! The CPU reference: one thread, one constraint at a time, in the order of the plan.
+//! The CPU reference: one thread runs one constraint at a time, in the order of the plan.
 
 use super::super::{Backend, CheckedStep};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
@@ -16,13 +16,13 @@ use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, ImpulseNumber, JointRow, NodeRow, StepProblem};
 
-/// Runs the doubles of the kernels over `S`: `f32` for the reference, `f64` to see what rounding does.
+/// Runs the Rust twins of the kernels over `S`: `f32` for the reference, `f64` to measure the effect of rounding.
 ///
 /// ```
 /// use drystone::{Backend, Reference};
 ///
 /// assert_eq!(Reference::<f32>::new().name(), "reference");
-/// // The same kernels in double precision, to see what rounding does.
+/// // The same kernels in double precision, to measure the effect of rounding.
 /// assert!(Reference::<f64>::new().rows().bodies.is_empty());
 /// ```
 #[derive(Debug, Default)]
@@ -30,12 +30,12 @@ pub struct Reference<S> {
     rows: KernelRows<S>,
     free: Vec<Free<S>>,
     convergence: ConvergenceRow,
-    /// Factors of the joints that are solved at once.
+    /// Factors of the joint systems.
     factors: JointFactors<S>,
     /// Their corrections, in the order of impulses.
     joint_changes: Vec<Vec3<S>>,
-    /// State of accelerated sweeps: velocities of the sweep before, impulses of points and joints, and how far a sweep moved the
-    /// impulses.
+    /// State of accelerated sweeps: velocities of the previous sweep, impulses of points and joints, and the change of
+    /// the impulses in a sweep.
     velocities_before: Vec<[Vec3<S>; 2]>,
     point_steps: Vec<ImpulseStep<S>>,
     joint_steps: Vec<ImpulseStep<S>>,
@@ -43,27 +43,27 @@ pub struct Reference<S> {
 }
 
 impl<S: Scalar> Reference<S> {
-    /// A reference with nothing loaded.
+    /// A reference without rows.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A reference with these rows loaded, for [`Reference::advance`].
+    /// A reference with these rows, for [`Reference::advance`].
     pub fn holding(rows: KernelRows<S>) -> Self {
         Self { rows, ..Self::default() }
     }
 
-    /// The rows as the last passes left them.
+    /// The rows after the last passes.
     pub fn rows(&self) -> &KernelRows<S> {
         &self.rows
     }
 
-    /// The rows, to change before the next passes.
+    /// The rows, mutable between passes.
     pub fn rows_mut(&mut self) -> &mut KernelRows<S> {
         &mut self.rows
     }
 
-    /// Runs passes over the rows that are loaded, in all the digits of `S`; `problem` says which row belongs to which.
+    /// Runs passes over the loaded rows in the precision of `S`; `problem` has the indices between rows.
     pub fn advance(&mut self, problem: &StepProblem, passes: &[Pass]) {
         for pass in passes {
             self.run_pass(problem, pass);
@@ -261,7 +261,7 @@ impl<S: Scalar> Reference<S> {
     }
 }
 
-/// The rows that a pass goes over.
+/// The rows of a pass.
 fn places(problem: &StepProblem, pass: &Pass) -> impl Iterator<Item = usize> {
     problem.rows_of(&pass.colors).iter().map(|&row| row as usize)
 }

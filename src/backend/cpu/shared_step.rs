@@ -1,4 +1,4 @@
-//! One pass over one part of a step, on one thread or on all.
+//! Runs one pass over one part of a step, on one thread or on all.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -16,7 +16,7 @@ use crate::lanes::{InstructionSet, Row8, Shared, WIDTH};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{Block, ContactRow, JointRow, Params, StepProblem};
 
-/// The data of a step, shared by threads that have different parts of it.
+/// The data of a step, shared by threads that work on different parts of it.
 pub(super) struct SharedStep<'a> {
     pub instructions: InstructionSet,
     pub params: &'a Params,
@@ -43,7 +43,7 @@ pub(super) struct SharedStep<'a> {
     pub moving: &'a AtomicBool,
 }
 
-/// Runs some work over some groups, on one thread or on many.
+/// Runs work over groups, on one thread or on many.
 pub(super) type Spread<'a> = &'a dyn Fn(Range<usize>, &(dyn Fn(Range<usize>) + Sync));
 
 impl SharedStep<'_> {

@@ -16,8 +16,8 @@ use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
 
-/// A pass over the groups of one color; `AS_ONE` for kernels that press the points of a manifold as one, whose code would take registers from
-/// the sweeps.
+/// A pass over the groups of one color. `AS_ONE` is for kernels that treat the points of a manifold as one: their code
+/// would take registers from the other sweeps.
 pub(super) struct Sweep<'a, C, const AS_ONE: bool> {
     pub kernel: Kernel,
     pub params: &'a Params,
@@ -58,7 +58,7 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
             }
         }
         let own = group.impulses();
-        // Impulses and rows are used in place: copies were most of what a sweep moved.
+        // Use impulses and rows in place: copies were most of the memory traffic of a sweep.
         // SAFETY: `LaneLayout::make_groups` gives each group impulses and points of its own.
         let mut rows =
             unsafe { GroupRows { points: self.points.slice(own.clone()), impulses: self.impulses.slice(own) } };
@@ -135,7 +135,7 @@ unsafe fn wide_pair<L: Lanes>(states: *const State, a: &BodyLanes, b: &BodyLanes
     }
 }
 
-/// Writes the velocities of those that can move.
+/// Writes the velocities of the movable bodies.
 ///
 /// # Safety
 /// The places are those of states, and no other thread uses those that can move meanwhile.
@@ -147,7 +147,7 @@ unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &BodyLanes, bod
     }
     let rows = velocity_rows(body.v, body.w);
     for lane in 0..WIDTH {
-        // Almost always all of them.
+        // Almost always all are movable.
         if movable == u16::MAX || movable & (1 << lane) != 0 {
             // SAFETY: the caller's promise.
             unsafe { row_at((&raw mut (*states).velocity).cast_const(), places[lane]).cast_mut().write(rows[lane]) };
@@ -155,7 +155,7 @@ unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &BodyLanes, bod
     }
 }
 
-/// Numbers of sixteen as a row of lanes, in the same order.
+/// Sixteen-lane numbers as a value of lanes, in the same order.
 ///
 /// # Safety
 /// `T` is `repr(C)` and holds `N` lanes and nothing else.

@@ -1,16 +1,16 @@
 //! Threads that stay awake for one run of a plan: a leader and its helpers.
 //!
-//! A color can be 20 us of work, and waking a sleeping thread costs half of that. So helpers look for work without a pause until the
-//! run ends, and between runs there are no helpers. One atomic number hands out work: the leader takes chunks from the front and
-//! helpers take chunks from the back, so that each thread finds much of its own work in its cache. The leader can do everything alone:
-//! it waits only for chunks that helpers have taken.
+//! A color can be 20 us of work, and waking a sleeping thread costs half of that. Therefore helpers look for work
+//! without a pause until the run ends, and between runs there are no helpers. One atomic number hands out work: the
+//! leader takes chunks from the front and helpers take chunks from the back, so that each thread finds much of its own
+//! data in its cache. The leader can do everything alone: it waits only for chunks that helpers have taken.
 
 #![allow(unsafe_code)]
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
-/// Work over a range, on the stack of [`Threads::spread`].
+/// Work over a range. It lives on the stack of [`Threads::spread`].
 struct Job<'a> {
     work: &'a (dyn Fn(Range<usize>) + Sync),
     range: Range<usize>,
@@ -33,24 +33,25 @@ struct CachePadded<T>(T);
 #[derive(Default)]
 pub(super) struct Threads {
     helpers: usize,
-    /// Chunks that are still open: the first in the upper half, one past the last in the lower.
+    /// Open chunks: the first one in the upper half, one past the last in the lower half.
     open: CachePadded<AtomicU64>,
-    /// Chunks that are done.
+    /// Number of finished chunks.
     finished: CachePadded<AtomicUsize>,
     job: AtomicPtr<Job<'static>>,
     over: AtomicBool,
 }
 
-/// Least groups of sixteen in a chunk: about a microsecond of work, ten times the cost of taking a chunk. Miri has small problems.
+/// Smallest number of groups of sixteen in a chunk: about a microsecond of work, ten times the cost of taking a chunk.
+/// Miri has small problems.
 const GROUPS_PER_CHUNK: usize = if cfg!(miri) { 1 } else { 4 };
-/// Chunks for each thread, so that one slow thread does not hold up all.
+/// Number of chunks for each thread, so that one slow thread does not delay all.
 const CHUNKS_PER_THREAD: usize = 4;
-/// Looks for work before a thread yields the processor. Miri runs threads in turns, so looking again is of no use there.
+/// Number of checks for work before a thread yields the processor. Miri runs threads in turns, so repeated checks are
+/// useless there.
 const LOOKS_BEFORE_YIELD: u32 = if cfg!(miri) { 1 } else { 4000 };
 
 impl Threads {
-    /// Leads a run in which no pass goes over more than `widest` groups, with the threads of the pool that this thread
-    /// belongs to.
+    /// Leads a run in which no pass has more than `widest` groups, with the threads of the current pool.
     pub fn lead<R: Send>(widest: usize, lead: impl FnOnce(&Self) -> R + Send) -> R {
         let count = rayon::current_num_threads();
         if count == 1 || widest < 2 * GROUPS_PER_CHUNK {
@@ -58,13 +59,13 @@ impl Threads {
         }
         let threads = Self { helpers: count - 1, ..Self::default() };
         threads.beside_helpers(threads.helpers, || {
-            // Helpers leave whether the leader returns or panics.
+            // Helpers leave when the leader returns or panics.
             let _end = OnDrop(|| threads.over.store(true, Ordering::Release));
             lead(&threads)
         })
     }
 
-    /// Runs `lead` beside some helpers.
+    /// Runs `lead`, with helpers in parallel.
     fn beside_helpers<R: Send>(&self, helpers: usize, lead: impl FnOnce() -> R + Send) -> R {
         fn beside<R: Send>(threads: &Threads, helpers: usize, lead: &mut (dyn FnMut() -> R + Send)) -> R {
             if helpers == 0 {
@@ -81,7 +82,7 @@ impl Threads {
         self.spread_in_chunks(groups, GROUPS_PER_CHUNK, work);
     }
 
-    /// Runs `work` over items that are each worth a chunk.
+    /// Runs `work` over items. Each item is large enough for a chunk.
     pub fn spread_each(&self, items: Range<usize>, work: &(dyn Fn(Range<usize>) + Sync)) {
         self.spread_in_chunks(items, 1, work);
     }
@@ -126,7 +127,7 @@ impl Threads {
         self.finished.0.fetch_add(1, Ordering::Release);
     }
 
-    /// Takes an open chunk, if there is one: `which` chooses it, and `rest` gives those that stay open.
+    /// Takes an open chunk, if there is one. `which` chooses it, and `rest` returns the chunks that stay open.
     fn take(&self, rest: fn([usize; 2]) -> [usize; 2], which: fn([usize; 2]) -> usize) -> Option<usize> {
         let mut open = self.open.0.load(Ordering::Relaxed);
         loop {
@@ -148,7 +149,7 @@ fn halves(open: u64) -> [usize; 2] {
     [(open >> 32) as usize, (open & 0xffff_ffff) as usize]
 }
 
-/// Looks again until `done`; after a while it yields the processor between two looks.
+/// Repeats a check until `done`. After a while it yields the processor between two checks.
 fn wait(mut done: impl FnMut() -> bool) {
     let mut looks = 0;
     while !done() {
@@ -198,8 +199,8 @@ mod tests {
         }
     }
 
-    /// Plain memory that the leader writes before it hands out a job, and helpers before they finish a chunk. Miri reports a race
-    /// where the order of the hand-over is too weak.
+    /// Plain memory. The leader writes it before it hands out a job, and helpers write it before they finish a chunk.
+    /// Miri reports a race if the memory ordering of the hand-over is too weak.
     #[test]
     fn each_side_sees_what_the_other_wrote_before_the_hand_over() {
         with_threads(2, || {
@@ -210,7 +211,7 @@ mod tests {
                     threads.spread(0..64, &|range| {
                         // SAFETY: `Threads::spread` cuts the range.
                         unsafe { shared.slice(range) }.iter_mut().for_each(|number| *number += round);
-                        // A helper has its turn.
+                        // Lets a helper run.
                         std::thread::yield_now();
                     });
                     assert_eq!(numbers, [round * (round + 1) / 2; 64]);

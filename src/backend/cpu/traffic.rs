@@ -1,4 +1,4 @@
-//! Bytes that the lanes hold and move, to compare sweeps with the limits of memory.
+//! Bytes that the lanes hold and move, for comparison with memory limits.
 
 use super::Cpu;
 use super::bodies::State;
@@ -7,8 +7,9 @@ use crate::lanes::{Row8, WIDTH};
 use crate::plan::Kernel;
 
 impl Cpu {
-    /// Bytes that a sweep of `kernel` over all contacts of the last run reads and writes: groups and points read, impulses read and
-    /// written, and for each lane two bodies read and their velocities written. Lanes without a contact count.
+    /// Bytes that a sweep of `kernel` over all contacts of the last run reads and writes: it reads groups and points,
+    /// reads and writes impulses, and for each lane reads two bodies and writes their velocities. Empty lanes count
+    /// too.
     pub fn bytes_of_sweep(&self, kernel: Kernel) -> usize {
         let start = if kernel.reads_start() { size_of::<Row8>() } else { 0 };
         let body = size_of::<State>() + size_of::<Row8>() + start;
@@ -17,7 +18,7 @@ impl Cpu {
         self.bytes_of_groups() + rows + self.contacts.groups.len() * 2 * WIDTH * body
     }
 
-    /// Bytes of all that sweeps read or write, each counted once.
+    /// Bytes of all data that sweeps read or write, each counted once.
     pub fn bytes_of_contacts(&self) -> usize {
         let rows = self.contact_points.bytes(true) + self.contact_impulses.bytes(true);
         self.bytes_of_groups() + rows + size_of_val(&self.bodies[..])

@@ -1,4 +1,4 @@
-//! Rows of a problem into lanes, and impulses back: sixteen rows at a time, number by number.
+//! Copies rows of a problem into lanes, and impulses back: sixteen rows at a time, number by number.
 
 #![allow(unsafe_code)]
 
@@ -11,17 +11,17 @@ use super::lane_rows::{LaneImpulses, OwnImpulses, OwnPoints, SharedImpulses, Sha
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, lanes};
 use crate::problem::StepProblem;
 
-/// Where a body's state is, and whether the body can move.
+/// The place of a body's state, and whether the body is movable.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BodyPlace {
     pub place: u32,
     pub is_movable: bool,
 }
 
-/// Takes over the rows of groups.
+/// Loads the rows of groups.
 pub(super) struct Load<'a, C> {
     pub problem: &'a StepProblem,
-    /// Body by body; last that of the placeholder.
+    /// One for each body, then the placeholder.
     pub places: &'a [BodyPlace],
     pub groups: Shared<'a, LaneGroup>,
     pub points: SharedPoints<'a>,
@@ -29,7 +29,7 @@ pub(super) struct Load<'a, C> {
     pub constraint: PhantomData<C>,
 }
 
-/// Gives the impulses of groups back.
+/// Stores the impulses of groups.
 pub(super) struct Store<'a, C> {
     pub rows: &'a [C],
     pub groups: &'a [LaneGroup],
@@ -67,7 +67,7 @@ impl<C: Constraint> Load<'_, C> {
         }
     }
 
-    /// A row in each lane.
+    /// Loads a row into each lane.
     #[inline(always)]
     fn take_full<L: Lanes>(&self, group: &mut LaneGroup, points: OwnPoints, mut impulses: OwnImpulses) {
         let rows = C::rows(self.problem);
@@ -103,7 +103,7 @@ impl<C: Constraint> Load<'_, C> {
         }
     }
 
-    /// Lanes without a row hold zeros.
+    /// Empty lanes hold zeros.
     fn take_some(&self, group: &mut LaneGroup, mut points: OwnPoints, mut impulses: OwnImpulses) {
         let rows = C::rows(self.problem);
         let all_impulses = C::impulses(self.problem);
@@ -170,7 +170,7 @@ impl<C: Constraint> Work for Store<'_, C> {
 }
 
 impl<C: Constraint> Store<'_, C> {
-    /// Writes an impulse. The largest impulses stay as they are where the lanes have none.
+    /// Writes an impulse. The largest impulses stay unchanged if the lanes have none.
     ///
     /// # Safety
     /// No other task has the same one.
@@ -183,7 +183,8 @@ impl<C: Constraint> Store<'_, C> {
     }
 }
 
-/// The first of two neighboring impulses, so that all of `count`, two or more, occur; the last two may overlap those before.
+/// First indices of pairs of neighboring impulses that cover all `count`, two or more. The last pair can overlap the
+/// one before.
 #[inline(always)]
 fn pairs_of(count: usize) -> impl Iterator<Item = usize> {
     (0..count).step_by(2).map(move |k| k.min(count - 2))

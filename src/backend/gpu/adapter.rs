@@ -5,7 +5,7 @@ use std::fmt;
 use super::block_on;
 use crate::error::{Error, Result};
 
-/// An adapter, as reports name it.
+/// A description of an adapter, for reports.
 ///
 /// ```
 /// use drystone::backend::gpu::{AdapterSummary, adapters};
@@ -21,15 +21,15 @@ pub struct AdapterSummary {
     pub api: String,
     /// Driver and version.
     pub driver: String,
-    /// Discrete, integrated, virtual, or software running on the processor.
+    /// Discrete, integrated, virtual, or software on the processor.
     pub kind: &'static str,
     /// Whether the adapter is hardware.
     pub hardware: bool,
-    /// Whether it takes SPIR-V, in which exact mode forbids the driver to reassociate.
+    /// Whether it accepts SPIR-V. In SPIR-V, exact mode can forbid the driver to reassociate.
     pub takes_spirv: bool,
-    /// Whether it has a clock that times kernels.
+    /// Whether it has a clock to time kernels.
     pub clock: bool,
-    /// Largest buffer that a kernel can be given (B).
+    /// Largest buffer for a kernel (B).
     pub buffer_limit: u64,
 }
 
@@ -39,7 +39,7 @@ impl fmt::Display for AdapterSummary {
     }
 }
 
-/// Which adapter to open.
+/// The adapter to open.
 ///
 /// ```
 /// use drystone::backend::gpu::{AdapterChoice, adapters, open_device};
@@ -50,19 +50,20 @@ impl fmt::Display for AdapterSummary {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum AdapterChoice {
-    /// The one with the most hardware: discrete, integrated, virtual, then software.
+    /// The best adapter, in this order: discrete, integrated, virtual, then software.
     Best,
-    /// The best that is not software.
+    /// The best adapter that is not software.
     Hardware,
 }
 
-/// Advice where no adapter is found.
+/// Advice for a machine without an adapter.
 const INSTALL: &str = "install a graphics driver, or the software one: `apt-get install mesa-vulkan-drivers` on Debian and Ubuntu, \
     `dnf install mesa-vulkan-drivers` on Fedora, `pacman -S vulkan-swrast` on Arch";
 
-/// Adapters that can run the kernels, the one with the most hardware first.
+/// Adapters that can run the kernels, in the order of [`AdapterChoice::Best`].
 ///
-/// The variable `DRYSTONE_ADAPTER` narrows them to those whose name, API or driver contains it; `none` hides all.
+/// The environment variable `DRYSTONE_ADAPTER` selects adapters by a part of their name, API or driver; `none` hides
+/// all.
 ///
 /// ```
 /// for adapter in drystone::backend::gpu::adapters() {
@@ -73,7 +74,7 @@ pub fn adapters() -> Vec<AdapterSummary> {
     block_on(async { Ok(adapters_async().await) }).unwrap_or_default()
 }
 
-/// As [`adapters`], for a page, where `adapters` finds none.
+/// Like [`adapters`], for a web page, where `adapters` finds none.
 ///
 /// ```
 /// use drystone::backend::gpu::{adapters, adapters_async};
@@ -84,12 +85,12 @@ pub async fn adapters_async() -> Vec<AdapterSummary> {
     found().await.into_iter().map(|(_, summary)| summary).collect()
 }
 
-/// The variable `DRYSTONE_ADAPTER`; empty if it is not set.
+/// The environment variable `DRYSTONE_ADAPTER`; empty if it is not set.
 fn wanted() -> String {
     std::env::var("DRYSTONE_ADAPTER").unwrap_or_default()
 }
 
-/// The best adapter of those that `choice` allows and whose summary contains `name`.
+/// The best adapter that `choice` allows and whose summary contains `name`.
 pub(super) async fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Adapter, AdapterSummary)> {
     let lower = name.to_lowercase();
     let fits = |s: &AdapterSummary| {
@@ -111,7 +112,7 @@ pub(super) async fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Ada
     })
 }
 
-/// Opens the adapter that `choice` finds, for drawing.
+/// Opens the adapter of `choice` for drawing.
 ///
 /// ```
 /// use drystone::backend::gpu::{AdapterChoice, adapters, open_device};
@@ -122,7 +123,7 @@ pub(super) async fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Ada
 /// ```
 ///
 /// # Errors
-/// No such adapter, or it cannot be opened.
+/// There is no such adapter, or it cannot be opened.
 pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, AdapterSummary)> {
     block_on(async {
         let (adapter, summary) = find(choice, "").await?;
@@ -132,11 +133,11 @@ pub fn open_device(choice: AdapterChoice) -> Result<(wgpu::Device, wgpu::Queue, 
 }
 
 async fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
-    // `none` loads no driver.
+    // With `none`, no driver is loaded.
     if wanted().eq_ignore_ascii_case("none") {
         return Vec::new();
     }
-    // OpenGL only where there is nothing better: its loaders are noisy on machines without a display.
+    // Try OpenGL only as a last resort: its loaders write messages on machines without a display.
     for backends in [wgpu::Backends::PRIMARY, wgpu::Backends::SECONDARY] {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends,
@@ -151,7 +152,7 @@ async fn found() -> Vec<(wgpu::Adapter, AdapterSummary)> {
     Vec::new()
 }
 
-/// Adapters of an instance that can run the kernels and whose summary contains the wanted name, the one with the most hardware first.
+/// Adapters of an instance that can run the kernels and whose summary contains the wanted name, best first.
 async fn usable(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<(wgpu::Adapter, AdapterSummary)> {
     let wanted = wanted().to_lowercase();
     let all = instance.enumerate_adapters(backends).await.into_iter().filter(can_compute);
@@ -164,7 +165,7 @@ async fn usable(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<(wgp
 /// Opens the best adapter that can draw on `window`.
 ///
 /// # Errors
-/// There is none, or it cannot be opened.
+/// There is no such adapter, or it cannot be opened.
 pub fn open_for_surface(
     display: Box<dyn wgpu::wgt::WgpuHasDisplayHandle>,
     window: impl Into<wgpu::SurfaceTarget<'static>>,
@@ -188,7 +189,7 @@ fn can_compute(adapter: &wgpu::Adapter) -> bool {
         && adapter.limits().max_storage_buffers_per_shader_stage >= 8
 }
 
-/// Kinds of adapters with their names, the one with the most hardware first.
+/// Kinds of adapters with their names, best first.
 const KINDS: [(wgpu::DeviceType, &str); 5] = [
     (wgpu::DeviceType::DiscreteGpu, "discrete"),
     (wgpu::DeviceType::IntegratedGpu, "integrated"),
@@ -212,14 +213,14 @@ fn summarize(adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
-/// Opens an adapter, for shaders of SPIR-V too where `spirv` asks for that.
+/// Opens an adapter; with `spirv`, also for SPIR-V shaders.
 pub(super) async fn open(adapter: &wgpu::Adapter, spirv: bool) -> Result<(wgpu::Device, wgpu::Queue)> {
     let offered = adapter.limits();
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("drystone"),
         required_features: if spirv { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
             | adapter.features() & (super::timer::FEATURES | wgpu::Features::PIPELINE_CACHE),
-        // The limits of every WebGPU implementation, with buffers as large as the adapter allows.
+        // The limits of every WebGPU implementation, except that buffers can be as large as the adapter allows.
         required_limits: wgpu::Limits {
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             max_buffer_size: offered.max_buffer_size,

@@ -1,4 +1,5 @@
-//! The buffers of a device: one for each binding. A buffer grows with its rows; the host remembers the content that it knows.
+//! The buffers of a device, one for each binding. A buffer grows with its rows, and the host remembers the content that
+//! it knows.
 
 use std::ops::Range;
 use std::pin::Pin;
@@ -9,7 +10,7 @@ use super::bindings::Binding;
 use super::submissions::Submissions;
 use crate::error::{Error, Result};
 
-/// Bytes that are compared and sent together.
+/// Size of a block that is compared and sent as a whole (B).
 const BLOCK: usize = 1024;
 
 /// The buffers of a device.
@@ -17,22 +18,22 @@ pub(super) struct Buffers {
     device: wgpu::Device,
     queue: wgpu::Queue,
     adapter: String,
-    /// Largest buffer that a kernel can be given (B).
+    /// Largest buffer for a kernel (B).
     limit: u64,
-    /// Most memory that all buffers take together (B).
+    /// Largest total memory of all buffers (B).
     memory: u64,
     slots: Vec<Slot>,
-    /// New buffers, for which the device may lack memory.
+    /// New buffers. The device has not yet confirmed their memory.
     created: Vec<Created>,
-    /// A buffer that the device writes and the processor reads. One is enough: the host waits for every read-back before the next
-    /// submission.
+    /// A buffer that the device writes and the processor reads. One is enough: the host waits for every read-back
+    /// before the next submission.
     staging: Option<wgpu::Buffer>,
-    /// A number that grows when a binding gets another buffer: older bind groups are no longer valid.
+    /// A counter that grows when a binding gets another buffer. Older bind groups are then invalid.
     pub generation: u64,
     sent: u64,
 }
 
-/// A new buffer: the refusal where the device lacks the memory, and what the device says of that.
+/// A new buffer: the error if the device lacks the memory, and the pending answer of the device.
 struct Created {
     refusal: Error,
     is_refused: Pin<Box<dyn Future<Output = Option<wgpu::Error>> + Send>>,
@@ -69,7 +70,7 @@ impl Buffers {
         self.slots[binding as usize].buffer.as_ref().expect("every buffer is made before a kernel is bound")
     }
 
-    /// Refuses rows that no buffer holds.
+    /// Refuses rows that fit into no buffer.
     pub fn check(&self, binding: Binding, bytes: usize) -> Result<()> {
         if bytes as u64 <= self.limit {
             return Ok(());
@@ -81,7 +82,7 @@ impl Buffers {
         )))
     }
 
-    /// Makes room for `size` bytes; the content may be lost.
+    /// Makes room for `size` bytes. The content can be lost.
     pub fn reserve(&mut self, binding: Binding, size: usize) -> Result<()> {
         let size = size as u64;
         let slot = &mut self.slots[binding as usize];
@@ -98,7 +99,7 @@ impl Buffers {
         Ok(())
     }
 
-    /// Makes room for `size` bytes; the first `kept` bytes stay.
+    /// Makes room for `size` bytes. The first `kept` bytes stay.
     pub async fn grow(&mut self, binding: Binding, kept: usize, size: usize) -> Result<()> {
         let before = self.slots[binding as usize].buffer.clone();
         self.reserve(binding, size)?;
@@ -111,13 +112,13 @@ impl Buffers {
         Ok(())
     }
 
-    /// Sends rows that begin at the byte `at`.
+    /// Sends rows, starting at the byte `at`.
     pub fn write(&mut self, binding: Binding, at: usize, bytes: &[u8]) {
         self.queue.write_buffer(self.get(binding), at as u64, bytes);
         self.sent += bytes.len() as u64;
     }
 
-    /// Bytes sent since this was last asked.
+    /// Bytes that were sent since the last call.
     pub fn take_sent(&mut self) -> u64 {
         std::mem::take(&mut self.sent)
     }
@@ -131,7 +132,7 @@ impl Buffers {
         Ok(())
     }
 
-    /// Sends the rows of a binding that the device does not have yet.
+    /// Sends those rows of a binding that the device does not have yet.
     pub fn update(&mut self, binding: Binding, bytes: &[u8]) -> Result<()> {
         self.reserve(binding, bytes.len())?;
         let known = std::mem::take(&mut self.slots[binding as usize].known);
@@ -148,14 +149,14 @@ impl Buffers {
         Ok(())
     }
 
-    /// Notes the content of a buffer; empty `bytes` mean that the content is unknown.
+    /// Records the content of a buffer. Empty `bytes` mean that the content is unknown.
     pub fn note(&mut self, binding: Binding, bytes: &[u8]) {
         let known = &mut self.slots[binding as usize].known;
         known.clear();
         known.extend_from_slice(bytes);
     }
 
-    /// Waits until the device has said of each new buffer whether there is memory for it.
+    /// Waits until the device has confirmed the memory of each new buffer.
     pub async fn settle(&mut self) -> Result<()> {
         let mut refusals = Vec::new();
         for Created { refusal, is_refused } in std::mem::take(&mut self.created) {
@@ -166,8 +167,9 @@ impl Buffers {
         refusals.into_iter().next().map_or(Ok(()), Err)
     }
 
-    /// Submits the encoder, which has work on so many `rows`, with copies of the `wanted` bindings, and of the first bytes of another buffer
-    /// `more`. Waits, writes the copies to `wanted`, and returns those of `more` as numbers. Nothing is written where anything fails.
+    /// Submits the encoder with its work on `rows` rows, and with copies of the `wanted` bindings and of the first
+    /// bytes of another buffer, `more`. Waits, writes the copies to `wanted`, and returns those of `more` as numbers.
+    /// If anything fails, nothing is written.
     pub async fn read_back(
         &mut self,
         submissions: &mut Submissions,
@@ -176,14 +178,14 @@ impl Buffers {
         more: Option<(&wgpu::Buffer, u64)>,
     ) -> Result<Vec<u64>> {
         let sum = wanted.iter().map(|(_, rows)| rows.len() as u64).sum::<u64>();
-        // The numbers are aligned to 8 bytes.
+        // Align the numbers to 8 bytes.
         let (own, size) = (sum.next_multiple_of(8), sum.next_multiple_of(8) + more.map_or(0, |m| m.1));
         if size == 0 {
             submissions.submit(encoder);
             submissions.wait(rows).await?;
             return Ok(Vec::new());
         }
-        // A step that is given up leaves its buffer to wgpu.
+        // A dropped step leaves its buffer to wgpu.
         let staging = match self.staging.take().filter(|b| b.size() >= size) {
             Some(staging) => staging,
             None => {
@@ -218,7 +220,7 @@ impl Buffers {
         Ok(numbers)
     }
 
-    /// A buffer for `size` bytes. Before its use [`Self::settle`] says whether the device has the memory.
+    /// A buffer for `size` bytes. Before its use, [`Self::settle`] has to confirm the memory.
     fn create(&mut self, name: &str, size: u64, limit: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let size = size_of_buffer(size, limit);
@@ -240,7 +242,7 @@ impl Buffers {
     }
 }
 
-/// A size (B) for people.
+/// A size (B) in readable form.
 struct SizeText(u64);
 
 impl std::fmt::Display for SizeText {
@@ -250,8 +252,8 @@ impl std::fmt::Display for SizeText {
     }
 }
 
-/// Size of a buffer for `wanted` bytes, which are a multiple of 4 and at most `limit` (B). The size is a multiple of 4 too and at
-/// most the limit. Below the limit it is 1.5 times the wanted size, so that a growing pile does not need a new buffer every step.
+/// Size of a buffer for `wanted` bytes. `wanted` is a multiple of 4 and at most `limit` (B), and so is the result.
+/// Below the limit it is 1.5 times the wanted size, so that a growing pile does not need a new buffer every step.
 pub(super) fn size_of_buffer(wanted: u64, limit: u64) -> u64 {
     (wanted + wanted / 2).next_multiple_of(16).max(256).min(limit / 4 * 4)
 }

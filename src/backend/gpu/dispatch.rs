@@ -13,27 +13,27 @@ use crate::problem::{PassRow, StepProblem};
 /// One dispatch.
 pub(super) struct Dispatch {
     pub program: Program,
-    /// Rows that its threads share.
+    /// Number of rows that its threads divide among them.
     pub rows: usize,
-    /// Rows that one thread or all together go over, and what a dispatch costs besides.
+    /// Work: the rows of one thread or of all threads, plus the fixed cost of a dispatch.
     pub work: usize,
     /// Offset of the row of the pass in its buffer (B).
     pub pass_row: u32,
 }
 
 impl Dispatch {
-    /// A dispatch over so many rows.
+    /// A dispatch over `rows` rows.
     pub fn over(program: Program, rows: usize) -> Self {
         Self { program, rows, work: rows + ROWS_OF_A_DISPATCH, pass_row: 0 }
     }
 
-    /// Enough workgroups for every row, up to the limit of a dispatch, beyond which each thread takes more rows.
+    /// Enough workgroups for every row. Beyond the limit of a dispatch, each thread takes more rows.
     fn workgroups(&self, rows_a_thread: u32) -> u32 {
         (self.rows as u32).div_ceil(WORKGROUP * rows_a_thread).clamp(1, 65_535)
     }
 }
 
-/// A dispatch for each pass, and the buffer of their rows. Offsets into the buffer are multiples of `stride` bytes.
+/// A dispatch for each pass, and the buffer of their rows. Offsets in the buffer are multiples of `stride` bytes.
 pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -> (Vec<Dispatch>, Vec<u8>) {
     let mut bytes = Vec::new();
     let mut known = HashMap::new();
@@ -48,7 +48,7 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
         })
     };
     let dispatch = |pass: &Pass| {
-        // The order of the rows of some kernels does not matter.
+        // For some kernels the order of the rows does not matter.
         let is_ordered = !matches!(
             pass.kernel,
             Kernel::ClearImpulses
@@ -69,18 +69,18 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
     (dispatches, bytes)
 }
 
-/// Rows of a pass that threads can share.
+/// Rows of a pass that threads can divide among them.
 fn rows_of(problem: &StepProblem, pass: &Pass) -> usize {
     match pass.kernel {
         Kernel::Extrapolate { .. } => problem.bodies.len().max(problem.impulse_count()),
-        // A workgroup a chunk.
+        // One workgroup for each chunk.
         Kernel::MeasureStep => problem.impulse_count().div_ceil(IMPULSES_PER_CHUNK) * WORKGROUP as usize,
         Kernel::BeginSweep { .. } | Kernel::UpdateMomentum => 1,
         _ => problem.rows_of(&pass.colors).len(),
     }
 }
 
-/// How many of the dispatches one submission with room for so many rows takes: at least one.
+/// Number of dispatches that fit into one submission with room for `room` rows: at least one.
 pub(super) fn first_part(dispatches: &[Dispatch], room: usize) -> usize {
     let mut work = 0;
     let fits = dispatches.iter().take_while(|dispatch| {
@@ -90,7 +90,7 @@ pub(super) fn first_part(dispatches: &[Dispatch], room: usize) -> usize {
     fits.count().max(1)
 }
 
-/// Encodes dispatches as one compute pass. A thread goes over `rows_a_thread` rows where there are that many for each.
+/// Encodes dispatches as one compute pass. A thread takes `rows_a_thread` rows if there are enough for every thread.
 pub(super) fn encode(
     encoder: &mut wgpu::CommandEncoder,
     dispatches: &[Dispatch],

@@ -1,23 +1,24 @@
-//! Pipelines that a driver compiled, kept in a folder from one run to the next, where wgpu can (Vulkan).
+//! Compiled pipelines that stay in a folder from one run to the next, if wgpu supports it (Vulkan).
 
 use std::path::{Path, PathBuf};
 
 use crate::saved::hash_of;
 
-/// Bytes of the hash before the data.
+/// Size of the hash before the data (B).
 const HASH: usize = 8;
 
-/// What a driver compiled so far.
+/// The pipelines that a driver has compiled.
 pub(super) struct KeptPipelines {
     cache: wgpu::PipelineCache,
     file: PathBuf,
 }
 
 impl KeptPipelines {
-    /// Begins with what an earlier run left in the folder; none where wgpu keeps no pipelines of this adapter.
+    /// Loads the pipelines of an earlier run from the folder. Returns `None` if wgpu keeps no pipelines of this
+    /// adapter.
     #[allow(unsafe_code)]
     pub fn open(device: &wgpu::Device, folder: &Path) -> Option<Self> {
-        // A page has no files.
+        // A web page has no files.
         if cfg!(target_family = "wasm") || !device.features().contains(wgpu::Features::PIPELINE_CACHE) {
             return None;
         }
@@ -34,7 +35,8 @@ impl KeptPipelines {
         &self.cache
     }
 
-    /// Keeps all for the next run: the file is there as a whole or not at all. Without the file the next run compiles again.
+    /// Writes all pipelines for the next run. The file is either complete or absent. Without the file, the next run
+    /// compiles again.
     pub fn write(&self) -> std::io::Result<()> {
         let Some(data) = self.cache.get_data().filter(|_| !cfg!(target_family = "wasm")) else { return Ok(()) };
         std::fs::create_dir_all(self.file.parent().expect("a file in a folder"))?;
@@ -44,7 +46,7 @@ impl KeptPipelines {
     }
 }
 
-/// The data behind a hash that is theirs.
+/// The data after a matching hash.
 fn whole(kept: &[u8]) -> Option<&[u8]> {
     let (hash, data) = kept.split_at_checked(HASH)?;
     (hash == hash_of(data).to_le_bytes()).then_some(data)

@@ -1,15 +1,16 @@
-//! The GPU backend: the passes of a plan as dispatches of one compute pass in one submission.
+//! The GPU backend: the passes of a plan become dispatches of one compute pass in one submission.
 //!
-//! The programs stay inside the limits that every WebGPU implementation offers: at most 8 storage buffers a program, 64 threads a
-//! workgroup, no optional features. Only buffers may be as large as the adapter allows.
+//! The programs stay within the limits of every WebGPU implementation: at most 8 storage buffers a program, 64 threads
+//! a workgroup, no optional features. Only buffers can be as large as the adapter allows.
 //!
-//! [`Backend::run`] sends all rows of a problem and reads back all rows that the plan changes. [`Backend::step`] goes on from the
-//! rows that the step before left on the device (`resident.rs`): it sends the rows that changed and reads back poses, velocities and
-//! impulses. A step ends when all of its results are on the host, so that nothing is lost with a device: a step that fails leaves the
-//! problem as it was, and another device or the processor repeats it.
+//! [`Backend::run`] sends all rows of a problem and reads back all rows that the plan changes. [`Backend::step`]
+//! continues from the rows of the previous step on the device (`resident.rs`): it sends changed rows and reads back
+//! poses, velocities and impulses. A step ends when all its results are on the host. If a device is lost, no state is
+//! lost: a failed step leaves the problem unchanged, and another device or the processor repeats it.
 //!
-//! A step is one submission and one read-back, and several submissions where one would hold the device for long (`submissions.rs`). The
-//! host waits for the read-back: the next step begins with detection, and detection needs the poses of all bodies.
+//! A step is one submission and one read-back. If one submission would hold the device too long, it is divided
+//! (`submissions.rs`). The host waits for the read-back: the next step begins with detection, and detection needs the
+//! poses of all bodies.
 
 mod adapter;
 pub(crate) mod bindings;
@@ -47,14 +48,14 @@ use resident::ResidentRows;
 use submissions::{ROWS_OF_A_DISPATCH, Submissions};
 use timer::Timer;
 
-/// Rows that a thread of a software adapter goes over. llvmpipe starts every thread of a workgroup anew, which costs it more than the loop
-/// to another row: a step of a settled pile of 1,000 takes 13.1 ms with 1 row a thread and 11.7 ms with 4.
+/// Number of rows for a thread of a software adapter. llvmpipe restarts every thread of a workgroup, which costs more
+/// than a loop over more rows: a step of a settled pile of 1,000 takes 13.1 ms with 1 row a thread and 11.7 ms with 4.
 const SOFTWARE_ROWS_A_THREAD: u32 = 4;
 
-/// Devices of one run: after so many losses the processor goes on.
+/// Largest number of devices in one run. After that many losses the processor continues.
 const MOST_DEVICES: usize = 3;
 
-/// Follows plans on a device through wgpu.
+/// Runs plans on a device through wgpu.
 ///
 /// ```
 /// use drystone::{Backend, Gpu, backend::gpu::{AdapterChoice, GpuOptions, adapters}};
@@ -72,7 +73,7 @@ pub struct Gpu {
     options: GpuOptions,
     /// Number of devices that were lost before this one.
     lost: usize,
-    /// Rows that a thread of a dispatch goes over.
+    /// Number of rows for a thread of a dispatch.
     rows_a_thread: u32,
     pipelines: Pipelines,
     buffers: Buffers,
@@ -80,9 +81,9 @@ pub struct Gpu {
     timer: Option<Timer>,
     times: Vec<KernelTime>,
     traffic: Traffic,
-    /// The rows that the last step left, if the next can go on from them.
+    /// The rows of the last step, if the next step can continue from them.
     rows: Option<ResidentRows>,
-    /// Memory that every step uses again.
+    /// Reusable memory of a step.
     separations: Vec<f32>,
     colors: Vec<u32>,
     systems: Vec<u32>,
@@ -90,8 +91,8 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens the adapter that `choice` finds. `exact` asks for shaders that no driver can reassociate ([`GpuOptions::exact`]), so that
-    /// results are the reference's to the last bit.
+    /// Opens the adapter of `choice`. With `exact`, no driver can reassociate the arithmetic of shaders
+    /// ([`GpuOptions::exact`]), so that results equal the reference to the last bit.
     ///
     /// ```no_run
     /// use drystone::{Gpu, backend::gpu::AdapterChoice};
@@ -101,20 +102,20 @@ impl Gpu {
     /// ```
     ///
     /// # Errors
-    /// No such adapter, or it cannot be opened.
+    /// There is no such adapter, or it cannot be opened.
     pub fn new(choice: AdapterChoice, exact: bool) -> Result<Self> {
         Self::open(GpuOptions { adapter: choice, exact, ..GpuOptions::default() })
     }
 
-    /// Opens an adapter as `options` say. Waits on this thread; the page of a browser opens one by [`Gpu::open_async`].
+    /// Opens an adapter with `options`. This call blocks the thread; a web page uses [`Gpu::open_async`].
     ///
     /// # Errors
-    /// As of [`Gpu::new`].
+    /// Those of [`Gpu::new`].
     pub fn open(options: GpuOptions) -> Result<Self> {
         block_on(Self::open_async(options))
     }
 
-    /// As [`Gpu::open`], for a page: other tasks go on meanwhile.
+    /// Like [`Gpu::open`], for a web page: other tasks continue meanwhile.
     ///
     /// ```no_run
     /// use drystone::backend::gpu::GpuOptions;
@@ -130,12 +131,12 @@ impl Gpu {
     /// ```
     ///
     /// # Errors
-    /// As of [`Gpu::new`].
+    /// Those of [`Gpu::new`].
     pub async fn open_async(options: GpuOptions) -> Result<Self> {
         Self::open_after(0, options).await
     }
 
-    /// Opens an adapter after so many devices were lost.
+    /// Opens an adapter after `lost` devices were lost.
     async fn open_after(lost: usize, options: GpuOptions) -> Result<Self> {
         let Faults { shader, losses } = &options.faults;
         let (adapter, summary) = adapter::find(options.adapter, &options.name).await?;
@@ -168,23 +169,23 @@ impl Gpu {
         })
     }
 
-    /// What it runs on.
+    /// The adapter.
     pub fn summary(&self) -> &AdapterSummary {
         &self.summary
     }
 
-    /// Cuts its work as for hardware, so that a software adapter runs the dispatches that hardware runs.
+    /// Divides its work as for hardware, so that a software adapter runs the dispatches of a hardware adapter.
     pub fn cut_as_hardware(mut self) -> Self {
         self.rows_a_thread = 1;
         self
     }
 
-    /// Whether its results are the reference's to the last bit.
+    /// Whether its results equal the reference to the last bit.
     pub fn is_exact(&self) -> bool {
         self.options.exact
     }
 
-    /// Sends every row, also those that the device has.
+    /// Sends every row, even rows that the device already has.
     fn send_all(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         self.check(problem, passes)?;
         for (binding, _) in rows::small(problem, &[], &[]) {
@@ -194,9 +195,9 @@ impl Gpu {
         rows::of_contacts(problem).into_iter().try_for_each(|(binding, bytes)| self.buffers.send(binding, bytes))
     }
 
-    /// Sends the small rows that the device does not have yet.
+    /// Sends small rows that the device does not have yet.
     fn update_small_rows(&mut self, problem: &StepProblem) -> Result<()> {
-        // One buffer holds where each color begins, and then the rows of the colors.
+        // One buffer holds the start of each color, and then the rows of the colors.
         let shift = problem.colors.len() as u32;
         self.colors.clear();
         self.colors.extend(problem.colors.iter().map(|begin| begin + shift));
@@ -206,13 +207,13 @@ impl Gpu {
             self.buffers.update(binding, bytes)?;
         }
         if !problem.turning.is_empty() {
-            // This step turns those on the device.
+            // This step rotates those on the device.
             self.buffers.note(Binding::Masses, &[]);
         }
         Ok(())
     }
 
-    /// Refuses a problem that is too large, before any row is sent. Makes room for the buffers that stay on the device.
+    /// Refuses a problem that is too large before it sends any row. Makes room for the buffers that stay on the device.
     fn check(&mut self, problem: &StepProblem, passes: &[Pass]) -> Result<()> {
         for (binding, bytes) in rows::small(problem, &[], &[]).into_iter().chain(rows::of_contacts(problem)) {
             self.buffers.check(binding, bytes.len())?;
@@ -226,8 +227,9 @@ impl Gpu {
         Ok(())
     }
 
-    /// The dispatches `first`, then the passes, and the rows that they go over, ready for submission. With `together` the passes of a small
-    /// world are one dispatch. Of a plan that would hold the device for long, all but the last part is submitted here.
+    /// Encodes the dispatches `first`, then the passes. Returns them ready for submission with their number of rows.
+    /// With `together`, the passes of a small world are one dispatch. If a plan would hold the device too long, this
+    /// call submits all but the last part.
     async fn encoded(
         &mut self,
         problem: &StepProblem,
@@ -237,7 +239,7 @@ impl Gpu {
     ) -> Result<(wgpu::CommandEncoder, usize)> {
         let mut all = first;
         let stride = self.device.limits().min_uniform_buffer_offset_alignment as usize;
-        // The timer measures each kernel by itself. A long plan is cut, and one dispatch cannot be cut.
+        // The timer measures each kernel separately. One dispatch cannot be divided, unlike a long plan.
         let work = passes.len() * ROWS_OF_A_DISPATCH;
         let together = together && self.timer.is_none() && work <= self.submissions.room();
         match one_dispatch::of(problem, passes).filter(|_| together) {
@@ -264,7 +266,7 @@ impl Gpu {
             let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             dispatch::encode(&mut encoder, part, &self.pipelines, self.rows_a_thread, self.timer.as_mut());
             let rows = part.iter().map(|dispatch| dispatch.work).sum();
-            // A submission may not use a buffer that is not there.
+            // A submission must not use a missing buffer.
             self.buffers.settle().await?;
             if later.is_empty() {
                 return Ok((encoder, rows));
@@ -288,7 +290,7 @@ impl Gpu {
         }
     }
 
-    /// Runs the dispatches `first`, then the passes, and reads back all that they changed.
+    /// Runs the dispatches `first`, then the passes, and reads back all changed rows.
     async fn run_all(
         &mut self,
         problem: &mut StepProblem,
@@ -300,7 +302,7 @@ impl Gpu {
         self.finish(work, &mut rows::changed(problem)).await
     }
 
-    /// Submits work on so many rows, waits, and reads the `wanted` rows back.
+    /// Submits work on `rows` rows, waits, and reads the `wanted` rows back.
     async fn finish(
         &mut self,
         (mut encoder, rows): (wgpu::CommandEncoder, usize),
@@ -316,14 +318,14 @@ impl Gpu {
     }
 }
 
-/// Waits on this thread.
+/// Blocks this thread until the future completes.
 ///
 /// # Errors
-/// Those of the future; and in a page, which cannot wait.
+/// Those of the future; or this is a web page, which cannot block.
 pub(crate) fn block_on<T>(future: impl Future<Output = Result<T>>) -> Result<T> {
     if cfg!(target_family = "wasm") {
-        let instead = "the functions whose names end in _async do not wait";
-        return Err(Error::Adapter(format!("a page cannot wait for a device: {instead}")));
+        let instead = "use the functions whose names end in _async";
+        return Err(Error::Adapter(format!("a web page cannot block on a device: {instead}")));
     }
     pollster::block_on(future)
 }
@@ -372,7 +374,7 @@ impl Backend for Gpu {
             self.run_all(problem, first, passes, true).await?;
             self.count_bytes(problem, passes);
             for (binding, bytes) in rows::changed(problem) {
-                // The host compares no impulses of contacts with those of the step before.
+                // The host does not compare impulses of contacts with those of the step before.
                 if !matches!(binding, Binding::Impulses | Binding::Totals) {
                     self.buffers.note(binding, bytes);
                 }

@@ -1,29 +1,30 @@
-//! A small world in one dispatch: one workgroup follows the whole plan, with a barrier after every pass.
+//! Runs a small world in one dispatch: one workgroup runs the whole plan, with a barrier after every pass.
 //!
-//! A dispatch costs as much as a sweep over hundreds of contacts. Where no pass has more rows than a workgroup goes over in a
-//! few rounds, one shader holds all kernels of the plan. A uniform holds the passes, and the shader calls their kernels in this
-//! order. Results are the same to the last bit.
+//! A dispatch costs as much as a sweep over hundreds of contacts. If every pass has few rows, so that one workgroup
+//! needs only a few rounds, one shader holds all kernels of the plan. A uniform holds the passes, and the shader calls
+//! their kernels in this order. Results are the same to the last bit.
 //!
-//! A tower of ten on the software adapter, 33 passes: 1.15 ms a step in 33 dispatches, 1.05 in one of 64 threads, 0.39 in one of
-//! 8. There 8 threads are one subgroup, and a barrier inside a subgroup costs nothing.
+//! For a tower of ten on the software adapter, 33 passes: 1.15 ms a step in 33 dispatches, 1.05 ms in one dispatch of
+//! 64 threads, and 0.39 ms in one of 8 threads. There 8 threads are one subgroup, and a barrier inside a subgroup costs
+//! nothing.
 
 use super::wgsl::{PASS_ROWS, Program, WORKGROUP};
 use crate::collide::MAX_POINTS;
 use crate::plan::{Kernel, Pass};
 use crate::problem::StepProblem;
 
-/// Most rows that a pass may have: four for each thread.
+/// Largest number of rows of a pass: four for each thread.
 const MOST_ROWS: usize = 256;
-/// Most passes: the first row of the uniform is their number.
+/// Largest number of passes. The first row of the uniform is their number.
 const MOST_PASSES: usize = PASS_ROWS - 1;
-/// Most iterations of loops of one thread. Mesa's llvmpipe leaves a program after 65,535 in all, without a word: a step of 770 passes lost
-/// its last ones.
+/// Largest number of loop iterations of one thread. Mesa's llvmpipe silently leaves a program after 65,535 iterations
+/// in total: a step of 770 passes lost its last ones.
 const MOST_ITERATIONS: usize = 60_000;
-/// Fewest passes that are worth a shader of their own.
+/// Smallest number of passes for a shader of their own.
 const FEWEST_PASSES: usize = 4;
 
-/// The program for all passes, and the uniform that it reads: the number of passes, then a row a pass. None where the world is too
-/// large for one workgroup, or where a kernel needs more than one.
+/// The program for all passes, and its uniform: the number of passes, then a row for each pass. Returns `None` if the
+/// world is too large for one workgroup, or if a kernel needs more than one.
 pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec<[u32; 4]>)> {
     let rows = |pass: &Pass| {
         let colors = pass.colors.clone().map(|color| problem.rows_of(&(color..color + 1)).len());
@@ -34,7 +35,7 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
         && problem.points.len() <= 4 * MOST_ROWS
         && (FEWEST_PASSES..=MOST_PASSES).contains(&passes.len())
         && passes.iter().all(|pass| shares_only_rows(pass.kernel) && rows(pass) <= MOST_ROWS);
-    // Systems of joints have five buffers more.
+    // Systems of joints need five more buffers.
     if !fits || problem.has_systems() || needs_many_buffers(problem, passes) {
         return None;
     }
@@ -49,7 +50,7 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
     }
     // The uniform has the same size for every plan.
     table.resize(PASS_ROWS, [0; 4]);
-    // A thread for each row of the largest color: barriers inside one subgroup cost nothing.
+    // One thread for each row of the largest color: barriers inside one subgroup cost nothing.
     let threads = passes.iter().map(rows).max().unwrap_or(0).next_power_of_two().clamp(8, WORKGROUP as usize);
     let iterations = |pass: &Pass| {
         let of_color = |color| 2 + problem.rows_of(&(color..color + 1)).len().div_ceil(threads) * of_row(pass.kernel);
@@ -61,19 +62,19 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
     Some((Program::OneDispatch(kernels.into(), threads as u32), table))
 }
 
-/// Most iterations for a row of a kernel: over its points twice, or over the axes of a joint.
+/// Largest number of iterations for a row of a kernel: twice over its points, or over the axes of a joint.
 fn of_row(kernel: Kernel) -> usize {
     let sweeps = if let Kernel::SolveContacts(rules) = kernel { rules.passes.max(1) as usize } else { 1 };
     2 + sweeps * (3 + 2 * MAX_POINTS)
 }
 
-/// Whether threads of a kernel share nothing but rows, so that a program can hold the kernel with others.
+/// Whether threads of a kernel share only rows, so that one program can hold the kernel with others.
 fn shares_only_rows(kernel: Kernel) -> bool {
     !matches!(kernel, Kernel::Extrapolate { .. } | Kernel::MeasureStep | Kernel::UpdateMomentum)
 }
 
-/// Whether all kernels together need more than the eight storage buffers of a stage: bodies, masses, free, contacts, points,
-/// impulses and colors are seven.
+/// Whether all kernels together need more than the eight storage buffers of a stage. Bodies, masses, free, contacts,
+/// points, impulses and colors are seven.
 fn needs_many_buffers(problem: &StepProblem, passes: &[Pass]) -> bool {
     let measured = passes.iter().any(|pass| matches!(pass.kernel, Kernel::BeginSweep { .. }));
     let contacts = if problem.contacts.is_empty() { 0 } else { 3 };

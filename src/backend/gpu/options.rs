@@ -1,11 +1,11 @@
-//! How a device is opened and used.
+//! Options for opening and using a device.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use super::adapter::AdapterChoice;
 
-/// How a device is opened and used: [`Gpu::open`](super::Gpu::open).
+/// Options for opening and using a device: see [`Gpu::open`](super::Gpu::open).
 ///
 /// ```no_run
 /// use drystone::Gpu;
@@ -16,29 +16,32 @@ use super::adapter::AdapterChoice;
 /// ```
 #[derive(Clone, Debug)]
 pub struct GpuOptions {
-    /// Which adapter to open.
+    /// The adapter to open.
     pub adapter: AdapterChoice,
     /// A part of the name, the API or the driver of the adapter; empty for any.
     pub name: String,
-    /// Whether no driver can reassociate or fuse arithmetic, so that results are the reference's to the last bit. An adapter that takes
-    /// SPIR-V gets shaders with a decoration that forbids it. Others get WGSL whose sums and products integers steer, which keeps the bits
-    /// wherever it was tried; [`conform`](crate::conform) says whether it does here.
+    /// Exact mode: no driver can reassociate or fuse arithmetic, so that results equal the reference to the last bit.
+    /// If the adapter accepts SPIR-V, its shaders carry a decoration that forbids both. Otherwise integers guard the
+    /// sums and products of the WGSL. That has kept the bits on every tested adapter; [`conform`](crate::conform) tests
+    /// this one.
     pub exact: bool,
-    /// Whether exact mode takes steered WGSL where the adapter takes SPIR-V, too.
+    /// Whether exact mode uses the guarded WGSL even if the adapter accepts SPIR-V.
     pub steered: bool,
-    /// The folder in which pipelines stay from one run to the next, so that later runs compile none; [`BackendKind::open`](crate::backend::BackendKind::open)
-    /// and [`choose`](crate::backend::choose) take the variable `DRYSTONE_CACHE`. Vulkan only. A file that was changed is left out.
+    /// The folder in which compiled pipelines stay from one run to the next, so that later runs do not compile.
+    /// [`BackendKind::open`](crate::backend::BackendKind::open) and [`choose`](crate::backend::choose) read the
+    /// environment variable `DRYSTONE_CACHE`. Vulkan only. A modified file is ignored.
     pub cache: Option<PathBuf>,
-    /// Largest buffer (B); the limit of the adapter counts where it is lower.
+    /// Largest buffer (B). A lower limit of the adapter also applies.
     pub buffer_limit: u64,
-    /// Most memory that all buffers take together (B).
+    /// Largest total memory of all buffers (B).
     pub memory: u64,
-    /// Longest that one submission is meant to hold the device (s). A longer plan is cut into several submissions. Watchdogs of drivers
-    /// and desktops end work that holds a device for two seconds and more.
+    /// Target for the longest time that one submission holds the device (s). A longer plan is divided into several
+    /// submissions. Watchdogs of drivers and desktops end work that holds a device for two seconds or more.
     pub submission: Duration,
-    /// Whether another device, or the processor, goes on after the device was lost. Else the step fails: so measurements end.
+    /// Whether another device, or the processor, continues after the device was lost. Otherwise the step fails, which
+    /// ends a measurement.
     pub goes_on: bool,
-    /// Faults on purpose, for tests.
+    /// Injected faults, for tests.
     pub faults: Faults,
 }
 
@@ -59,7 +62,7 @@ impl Default for GpuOptions {
     }
 }
 
-/// Faults on purpose, so that tests can show that checks find them and that runs survive them.
+/// Injected faults. With them, tests can show that checks find faults and that runs survive them.
 ///
 /// ```no_run
 /// use drystone::Gpu;
@@ -74,17 +77,17 @@ impl Default for GpuOptions {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Faults {
-    /// Changes the WGSL of the program of this name before it is compiled.
+    /// Modifies the WGSL of the program of this name before compilation.
     pub shader: Option<fn(&str, String) -> String>,
-    /// When each device that is opened is lost, the first one first; devices beyond the last entry stay.
+    /// The time of loss for each opened device, in order. Devices beyond the last entry are not lost.
     pub losses: Vec<Loss>,
 }
 
-/// When a device is lost on purpose.
+/// The time at which a test loses a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Loss {
-    /// The submission, from 1.
+    /// The number of the submission, from 1.
     pub submission: u32,
-    /// Whether the device is lost while it works on the submission; else after that.
+    /// Whether the device is lost during the submission; otherwise after it.
     pub during: bool,
 }

@@ -1,4 +1,4 @@
-//! The pipelines of programs, compiled when a plan first asks for them.
+//! The pipelines of programs, compiled at first use.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -14,14 +14,14 @@ use super::wgsl_exact::exact_wgsl;
 use crate::error::Result;
 use crate::problem::PassRow;
 
-/// How shaders reach the driver.
+/// The form in which the driver gets shaders.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Shaders {
     /// As WGSL, which the driver may reassociate.
     Plain,
-    /// As SPIR-V that forbids it.
+    /// As SPIR-V that forbids reassociation.
     Spirv,
-    /// As WGSL whose arithmetic integers steer.
+    /// As WGSL with guarded arithmetic.
     Steered,
 }
 
@@ -29,17 +29,17 @@ pub(super) enum Shaders {
 pub(super) struct Pipelines {
     device: wgpu::Device,
     shaders: Shaders,
-    /// Changes shaders on purpose ([`Faults`](super::Faults)).
+    /// Injected shader faults ([`Faults`](super::Faults)).
     fault: Option<fn(&str, String) -> String>,
     compiled: HashMap<Program, Compiled>,
     kept: Option<KeptPipelines>,
 }
 
-/// What was compiled stays for the next run.
+/// Compiled pipelines stay for the next run.
 impl Drop for Pipelines {
     fn drop(&mut self) {
         if let Some(kept) = self.kept.as_ref().filter(|_| !self.compiled.is_empty()) {
-            // Without the file the next run compiles again.
+            // Without the file, the next run compiles again.
             let _ = kept.write();
         }
     }
@@ -49,7 +49,7 @@ impl Drop for Pipelines {
 pub(super) struct Compiled {
     pub pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
-    /// Bindings that it uses, in the order of their numbers.
+    /// Bindings of the pipeline, in the order of their numbers.
     bindings: Vec<Binding>,
     pub bind_group: wgpu::BindGroup,
     /// Generation of the buffers in the bind group.
@@ -57,14 +57,14 @@ pub(super) struct Compiled {
 }
 
 impl Compiled {
-    /// Whether it goes over colors, whose range stands at an offset of its own for each dispatch.
+    /// Whether it processes colors: their range is at a different offset for each dispatch.
     pub fn has_pass_row(&self) -> bool {
         self.bindings.contains(&Binding::PassRow)
     }
 }
 
 impl Pipelines {
-    /// `folder` keeps pipelines from run to run, where wgpu can.
+    /// `folder` keeps pipelines from run to run, if wgpu supports it.
     pub fn new(
         device: wgpu::Device,
         shaders: Shaders,
@@ -101,7 +101,7 @@ impl Pipelines {
         let mut reflected = Reflected::new(name, &source)?;
         if self.shaders == Shaders::Steered {
             source = exact_wgsl(&reflected, &source);
-            // With the buffer of the number that steers.
+            // Includes the buffer with the guard number.
             reflected = Reflected::new(name, &source)?;
         }
         let layout = layout(&self.device, &reflected);

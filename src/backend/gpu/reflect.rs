@@ -1,4 +1,4 @@
-//! A shader as naga understands it: which buffers it uses, and how.
+//! A shader after parsing by naga: its buffers and their use.
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 pub struct Reflected {
     /// The module.
     pub module: naga::Module,
-    /// What naga found out about it.
+    /// Naga's analysis of the module.
     pub info: ModuleInfo,
     /// Bindings that the entry point uses, in the order of their numbers.
     pub bindings: Vec<Binding>,
@@ -18,10 +18,10 @@ pub struct Reflected {
 }
 
 impl Reflected {
-    /// Parses and validates with no capability beyond plain WebGPU.
+    /// Parses and validates a shader with the capabilities of plain WebGPU.
     ///
     /// # Errors
-    /// The WGSL is wrong: a defect of this crate, reported with naga's own words.
+    /// The WGSL is invalid. That is a defect of this crate; the message has naga's words.
     pub fn new(name: &'static str, source: &str) -> Result<Self> {
         let wrong = |e: String| Error::Adapter(format!("shader {name}: {e}"));
         let module = naga::front::wgsl::parse_str(source).map_err(|e| wrong(e.emit_to_string(source)))?;
@@ -36,7 +36,7 @@ impl Reflected {
         Ok(Self { module, info, bindings, name })
     }
 
-    /// How the shader declares the buffer of a binding.
+    /// The address space of a binding in the shader.
     pub fn space(&self, binding: Binding) -> naga::AddressSpace {
         let number = |v: &naga::GlobalVariable| v.binding.as_ref().is_some_and(|at| at.binding == binding as u32);
         let mut variables = self.module.global_variables.iter().map(|(_, v)| v);

@@ -1,4 +1,4 @@
-//! Rows that stay on the device: from those of one step to those of the next.
+//! Rows that stay on the device, and their update from one step to the next.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -12,18 +12,18 @@ use crate::error::{Error, Result};
 use crate::problem::carry::{Carry, NO_POINT, Preload};
 use crate::problem::{ContactRow, StepProblem};
 
-// The shader writes no impulse to a point whose number before is `MAX_POINTS` or more.
+// The shader writes no impulse to a point whose earlier index is `MAX_POINTS` or more.
 const _: () = assert!(NO_POINT as usize == MAX_POINTS);
 
 /// The rows that a step left on the device.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ResidentRows {
-    /// Bytes of the rows of contacts, in the order of `rows::of_contacts`.
+    /// Sizes of the rows of contacts, in the order of `rows::of_contacts` (B).
     sizes: [usize; 4],
 }
 
 impl ResidentRows {
-    /// Those of a problem that just ran.
+    /// The rows of a problem that just ran.
     pub fn of(problem: &StepProblem) -> Self {
         Self { sizes: rows::of_contacts(problem).map(|(_, rows)| rows.len()) }
     }
@@ -33,27 +33,27 @@ impl ResidentRows {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ResidentParams {
-    /// What preloads follow from.
+    /// Parameters of preloads.
     pub preload: Preload,
     /// Number of bodies.
     pub body_count: u32,
-    /// Number of contacts that take part.
+    /// Number of active contacts.
     pub contact_count: u32,
-    /// Where their rows begin in the buffer of the colors.
+    /// The start of their rows in the buffer of the colors.
     pub order: u32,
-    /// Number of contacts whose rows the host computed anew.
+    /// Number of contacts whose rows the host recomputed.
     pub written_count: u32,
     /// 1 if the host sent all points.
     pub has_points: u32,
     /// 1 if friction at points has two directions.
     pub tangents: u32,
-    /// 0, which the compilers of shaders do not know: exact mode in WGSL.
+    /// Always 0, but shader compilers do not know it: for exact mode in WGSL.
     pub zero: u32,
     #[doc(hidden)]
     pub pad: u32,
 }
 
-/// The manifold of a contact whose rows were written again, 48 B. Twin of the WGSL struct of this name.
+/// The manifold of a contact with rewritten rows, 48 B. Twin of the WGSL struct of this name.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct WrittenContact {
@@ -67,15 +67,15 @@ pub struct WrittenContact {
     pub radius_a: f32,
     /// Radius of curvature of b's surface (m).
     pub radius_b: f32,
-    /// Length of its substeps over that of class 0.
+    /// Length of its substeps relative to that of class 0.
     pub substep_share: f32,
     /// One body.
     pub body_a: u32,
     /// The other one.
     pub body_b: u32,
-    /// Where the arms of its points begin, in points.
+    /// Index of the first arm of its points, in points.
     pub first_arms: u32,
-    /// How many points it has.
+    /// Its number of points.
     pub point_count: u32,
 }
 
@@ -98,8 +98,8 @@ impl WrittenContact {
     }
 }
 
-/// Sends what changed since the step before, and returns the programs that bring its rows to those of `problem`. `separations` is
-/// memory that every step uses again.
+/// Sends the changes since the step before, and returns the programs that update its rows to those of `problem`.
+/// `separations` is reusable memory.
 pub(super) async fn begin(
     buffers: &mut Buffers,
     problem: &StepProblem,
@@ -143,7 +143,7 @@ pub(super) async fn begin(
     Ok(programs)
 }
 
-/// Sends the manifolds that the host computed anew; the device computes their rows.
+/// Sends the recomputed manifolds; the device computes their rows.
 fn send_written(buffers: &mut Buffers, problem: &StepProblem, carry: &Carry) -> Result<()> {
     if carry.written.iter().any(|written| written.row as usize >= problem.contacts.len()) {
         return Err(Error::input("contacts written again: a row that is not there"));

@@ -1,18 +1,18 @@
-//! The rows of a problem as the bytes of buffers.
+//! Converts the rows of a problem to the bytes of buffers.
 
 use super::bindings::Binding;
 use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::{JointImpulseRow, JointSystems, StepProblem};
 
-/// Size of a row of the buffers that stay on the device: two vectors (B).
+/// Size of a row in the buffers that stay on the device: two vectors (B).
 pub const SCRATCH_ROW: usize = 32;
 
 /// Size of the struct `JointNode` of the shaders (B).
 pub const JOINT_NODE: usize = 272;
-/// That of `JointBlock` (B).
+/// Size of the struct `JointBlock` of the shaders (B).
 pub const JOINT_BLOCK: usize = 96;
 
-/// The lists of the systems of joints as one buffer: where five lists begin, and the lists.
+/// The lists of the joint systems as one buffer: the starts of five lists, then the lists.
 pub(super) fn pack_systems(problem: &StepProblem, packed: &mut Vec<u32>) {
     packed.clear();
     if !problem.has_systems() {
@@ -34,7 +34,7 @@ pub(super) fn pack_systems(problem: &StepProblem, packed: &mut Vec<u32>) {
     lists.iter().for_each(|list| packed.extend_from_slice(list));
 }
 
-/// Rows of which a step changes little.
+/// Rows that change little from step to step.
 pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 14] {
     [
         (Binding::Params, bytemuck::bytes_of(&problem.params)),
@@ -54,7 +54,7 @@ pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'
     ]
 }
 
-/// Rows of the contacts: most of a problem.
+/// Rows of the contacts, the largest part of a problem.
 pub(super) fn of_contacts(problem: &StepProblem) -> [(Binding, &[u8]); 4] {
     [
         (Binding::Contacts, bytemuck::cast_slice(&problem.contacts)),
@@ -77,7 +77,7 @@ pub(super) fn changed(problem: &mut StepProblem) -> [(Binding, &mut [u8]); 7] {
     ]
 }
 
-/// Bytes of the buffers that stay on the device. All but the first are for accelerated sweeps.
+/// Sizes of the buffers that stay on the device. All but the first are for accelerated sweeps.
 pub(super) fn scratch_sizes(problem: &StepProblem, accelerated: bool) -> [(Binding, usize); 7] {
     let (bodies, impulses) = (problem.bodies.len(), if accelerated { problem.impulse_count() } else { 0 });
     let before = if accelerated { bodies } else { 0 };

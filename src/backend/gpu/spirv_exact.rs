@@ -1,9 +1,9 @@
-//! Exact mode: SPIR-V that says of every sum and product that it must be computed as written.
+//! Exact mode in SPIR-V: every sum and product has to be computed as written.
 //!
-//! Plain WGSL leaves drivers free to reassociate and to fuse: software Vulkan turns `v + (x y - z w)` into
-//! `(v + x y) - z w`, and after four sweeps nearly every body differs in its last bits. With `NoContraction` on every
-//! arithmetic result it does not, at the same speed, and the GPU agrees with the reference to the last bit. naga writes no such
-//! decoration; this module adds it to the words of naga.
+//! Plain WGSL allows drivers to reassociate and to fuse. Software Vulkan turns `v + (x y - z w)` into `(v + x y) - z
+//! w`, and after four sweeps nearly every body differs in its last bits. With `NoContraction` on every arithmetic
+//! result it does not, at the same speed, and the GPU agrees with the reference to the last bit. Naga does not write
+//! this decoration, so this module adds it to naga's output.
 
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
@@ -23,7 +23,7 @@ fn is_arithmetic(opcode: u32) -> bool {
     matches!(opcode, 127 | 129 | 131 | 133 | 136 | 140 | 141 | 142..=148)
 }
 
-/// The same module, with every arithmetic result decorated.
+/// The same module with a decoration on every arithmetic result.
 fn without_contraction(words: &[u32]) -> Vec<u32> {
     let mut decorations = Vec::new();
     let mut annotations_begin = None;
@@ -38,17 +38,18 @@ fn without_contraction(words: &[u32]) -> Vec<u32> {
         }
         at += length.max(1);
     }
-    // Annotations stand together, and every kernel has some: its bindings.
+    // Annotations are contiguous, and every kernel has some: its bindings.
     let split = annotations_begin.unwrap_or(words.len());
     [&words[..split], &decorations, &words[split..]].concat()
 }
 
-/// SPIR-V in which no result may be reassociated or fused, and no index leaves its buffer: naga takes the smaller of an index
-/// and the last one of the buffer, as in the shaders that wgpu compiles itself where the driver does not do it. On the software
-/// adapter `solve_contacts` takes 1.01 times as long with these checks (pile of 2,000 and wall, 20 pairs of runs in turn).
+/// SPIR-V in which no result can be reassociated or fused, and no index leaves its buffer: naga takes the smaller of an
+/// index and the last index of the buffer. The shaders that wgpu compiles do the same, unless the driver does. On the
+/// software adapter, `solve_contacts` takes 1.01 times as long with these checks (pile of 2,000 and wall, 20 pairs of
+/// runs in turn).
 ///
 /// # Errors
-/// naga cannot write it.
+/// Naga cannot write it.
 pub fn exact_spirv(reflected: &Reflected) -> Result<Vec<u32>> {
     // wgpu numbers the bindings of a layout consecutively.
     let place = |(at, &binding): (usize, &Binding)| {
@@ -72,7 +73,7 @@ pub fn exact_spirv(reflected: &Reflected) -> Result<Vec<u32>> {
     Ok(without_contraction(&words.map_err(|e| Error::Adapter(format!("shader {}: {e}", reflected.name)))?))
 }
 
-/// A shader module of SPIR-V that wgpu hands to the driver as it is.
+/// A SPIR-V shader module that wgpu passes to the driver unchanged.
 #[allow(unsafe_code)]
 pub(super) fn shader_module(device: &wgpu::Device, reflected: &Reflected) -> Result<wgpu::ShaderModule> {
     let spirv = exact_spirv(reflected)?;

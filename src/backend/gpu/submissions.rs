@@ -1,4 +1,4 @@
-//! Submissions: how much work each holds, how long the device takes, and what becomes of errors.
+//! Submissions: their amount of work, their time on the device, and their errors.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -7,15 +7,16 @@ use super::options::Loss;
 use crate::error::{Error, Result};
 use crate::stats::Stopwatch;
 
-/// Rows of the first submission of a device whose speed is unknown: at most 100 MB, a tenth of a second at 1 GB/s.
+/// Number of rows in the first submission to a device of unknown speed: at most 100 MB, a tenth of a second at 1 GB/s.
 const FIRST_ROWS: usize = 1 << 18;
-/// A dispatch costs as much as the sweep over so many rows.
+/// A dispatch costs as much as a sweep over this number of rows.
 pub(super) const ROWS_OF_A_DISPATCH: usize = 256;
-/// A device that takes longer for a submission counts as lost. The work of a submission takes a tenth of a second.
+/// A device that takes longer for a submission counts as lost. The work of a submission normally takes a tenth of a
+/// second.
 #[cfg(not(target_family = "wasm"))]
 const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
-/// What a device reported outside a call.
+/// Errors that a device reported outside a call.
 #[derive(Default)]
 struct Reports {
     lost: Option<String>,
@@ -31,11 +32,11 @@ pub(super) struct Submissions {
     loss: Option<Loss>,
     count: u32,
     begun: Stopwatch,
-    /// Longest that a submission is meant to hold the device.
+    /// Target for the longest time of a submission on the device.
     target: Duration,
-    /// Rows a second of the last submission.
+    /// Rows per second of the last submission.
     speed: Option<f64>,
-    /// Number of submissions since this was last asked, and the time of the longest.
+    /// Number of submissions since the last query, and the time of the longest.
     taken: (usize, Duration),
 }
 
@@ -64,12 +65,12 @@ impl Submissions {
         Self { device, queue, adapter, reports, loss, count: 0, begun, target, speed: None, taken }
     }
 
-    /// Rows that one submission may sweep.
+    /// Number of rows that one submission can sweep.
     pub fn room(&self) -> usize {
         self.speed.map_or(FIRST_ROWS, |speed| (speed * self.target.as_secs_f64()) as usize)
     }
 
-    /// Hands work to the device.
+    /// Submits work to the device.
     pub fn submit(&mut self, encoder: wgpu::CommandEncoder) {
         self.begun = Stopwatch::start();
         self.queue.submit([encoder.finish()]);
@@ -77,7 +78,8 @@ impl Submissions {
         self.lose(true);
     }
 
-    /// Waits for the device, which was given work on so many `rows`. A page goes on with other tasks meanwhile; elsewhere this thread waits.
+    /// Waits for the device after work on `rows` rows was submitted. A web page continues with other tasks meanwhile;
+    /// elsewhere this thread blocks.
     ///
     /// # Errors
     /// The device is lost, or it reported an error.
@@ -121,12 +123,12 @@ impl Submissions {
         Error::Lost(format!("{}: the device was lost ({reason})", self.adapter))
     }
 
-    /// Number of submissions since this was last asked, and the time of the longest.
+    /// Returns and resets the number of submissions since the last call, and the time of the longest.
     pub fn take_taken(&mut self) -> (usize, Duration) {
         std::mem::take(&mut self.taken)
     }
 
-    /// Destroys the device where a test asks for that.
+    /// Destroys the device if a test requests it.
     fn lose(&mut self, during: bool) {
         if self.loss == Some(Loss { submission: self.count, during }) {
             self.device.destroy();
@@ -138,7 +140,7 @@ fn locked(reports: &Mutex<Reports>) -> std::sync::MutexGuard<'_, Reports> {
     reports.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A message of wgpu without line breaks.
+/// A message of wgpu on one line.
 pub(super) fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,8 +1,8 @@
-//! The time of each program by the clock of the device, where the device can write timestamps inside a pass; and the bandwidth of
-//! copies.
+//! Measures the time of each program by the clock of the device, if the device can write timestamps inside a pass, and
+//! the bandwidth of copies.
 //!
-//! A backend has a timer only on request: the software adapter ends its work at every timestamp, and a step of a tower of ten took
-//! 2.6 times as long with them.
+//! A backend has a timer only on request: the software adapter ends its work at every timestamp, and a step of a tower
+//! of ten took 2.6 times as long with timestamps.
 
 use std::time::Duration;
 
@@ -11,14 +11,14 @@ use super::wgsl::Program;
 use crate::error::Result;
 use crate::stats::{KernelTime, Stopwatch};
 
-/// The features of the adapter that a timer needs.
+/// Adapter features that a timer needs.
 pub(super) const FEATURES: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 
-/// Runs of one program that are timed in one submission: one less than the queries that a set can have.
+/// Largest number of timed program runs in one submission: one less than the largest number of queries in a set.
 const MOST: u32 = 4095;
 
-/// The name of the time between two submissions.
+/// The name for the time between two submissions.
 const PAUSE: &str = "";
 
 /// Timestamps of one step.
@@ -27,12 +27,12 @@ pub(super) struct Timer {
     resolved: wgpu::Buffer,
     /// Length of a tick (ns).
     period: f32,
-    /// Name of the program of each run.
+    /// Name of the program for each run.
     runs: Vec<&'static str>,
 }
 
 impl Timer {
-    /// None if the device has no such clock.
+    /// Returns `None` if the device has no such clock.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Option<Self> {
         if !device.features().contains(FEATURES) {
             return None;
@@ -51,12 +51,13 @@ impl Timer {
         Some(Self { queries, resolved, period: queue.get_timestamp_period(), runs: Vec::new() })
     }
 
-    /// Forgets the last step.
+    /// Discards the times of the last step.
     pub fn begin(&mut self) {
         self.runs.clear();
     }
 
-    /// Notes the time before a run of `program`. Of a submission with more runs than there are queries the first are timed.
+    /// Records the time before a run of `program`. If a submission has more runs than there are queries, only the first
+    /// runs are timed.
     pub fn before(&mut self, pass: &mut wgpu::ComputePass, program: &Program) {
         if self.runs.len() < MOST as usize {
             pass.write_timestamp(&self.queries, self.runs.len() as u32);
@@ -64,7 +65,8 @@ impl Timer {
         }
     }
 
-    /// Notes the time after the last run of a submission. The time from there to the next submission counts for no kernel.
+    /// Records the time after the last run of a submission. The time from then to the next submission counts for no
+    /// kernel.
     pub fn end(&mut self, pass: &mut wgpu::ComputePass) {
         pass.write_timestamp(&self.queries, self.runs.len() as u32);
         if self.runs.len() < MOST as usize {
@@ -72,18 +74,18 @@ impl Timer {
         }
     }
 
-    /// Writes the times to a buffer that can be copied from. Returns the buffer and the number of its bytes.
+    /// Writes the times to a buffer for copying. Returns the buffer and its size (B).
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) -> Option<(&wgpu::Buffer, u64)> {
         if self.runs.is_empty() {
             return None;
         }
-        // The last run is a pause, whose end nobody notes.
+        // The last run is a pause without an end time.
         let count = self.runs.len() as u32;
         encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
         Some((&self.resolved, u64::from(count) * wgpu::QUERY_SIZE as u64))
     }
 
-    /// Time of each program from the ticks that were read back, in the order of the first runs.
+    /// Time of each program from the ticks, in the order of the first runs.
     pub fn times(&self, ticks: &[u64]) -> Vec<KernelTime> {
         let mut times: Vec<KernelTime> = Vec::new();
         for (&kernel, ticks) in self.runs.iter().zip(ticks.windows(2)).filter(|(kernel, _)| **kernel != PAUSE) {
@@ -98,12 +100,12 @@ impl Timer {
     }
 }
 
-/// Bytes a second that the device reads and writes when it copies a large buffer: the limit of every sweep.
+/// Bytes per second that the device reads and writes when it copies a large buffer. It bounds the speed of every sweep.
 ///
 /// # Errors
 /// The device is lost.
 pub(super) async fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Submissions) -> Result<f64> {
-    // Larger than caches are, where the adapter has such buffers.
+    // Larger than caches, if the adapter has such buffers.
     let size = device.limits().max_storage_buffer_binding_size.min(256 << 20);
     let buffer = || {
         device.create_buffer(&wgpu::BufferDescriptor {
@@ -122,7 +124,7 @@ pub(super) async fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Subm
         submissions.wait(0).await?;
         Ok(start.elapsed().as_secs_f64())
     };
-    // The first copy touches the memory. The difference leaves out what a submission costs.
+    // The first copy touches the memory. The difference of two times removes the fixed cost of a submission.
     seconds(1).await?;
     let (few, many) = (seconds(2).await?, seconds(10).await?);
     Ok(2.0 * 8.0 * size as f64 / (many - few).max(1e-9))

@@ -12,7 +12,7 @@ use crate::plan::Kernel;
 
 /// Threads of a workgroup.
 pub const WORKGROUP: u32 = 64;
-/// Rows of the uniform that holds the passes of one dispatch: 16 KiB, what every adapter offers.
+/// Rows of the uniform with the passes of one dispatch: 16 KiB, which every adapter supports.
 pub const PASS_ROWS: usize = 1024;
 /// Name of every entry point.
 pub const ENTRY_POINT: &str = "main";
@@ -24,7 +24,7 @@ macro_rules! part {
     };
 }
 
-/// The files of a kernel over joints that have axes, or of one over joints that have none.
+/// The files of a kernel over joints, for joints with axes or without axes.
 macro_rules! of_joints {
     ($axes:expr, $name:literal) => {
         if $axes {
@@ -35,18 +35,18 @@ macro_rules! of_joints {
     };
 }
 
-/// What a pipeline runs.
+/// The program of a pipeline.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Program {
     /// A kernel of a plan over the rows of its colors, in any order.
     Pass(Kernel),
-    /// A kernel of a plan over its colors, one after another. One workgroup goes over them, with a barrier after each.
+    /// A kernel of a plan over its colors in order. One workgroup runs it, with a barrier after each color.
     Fused(Kernel),
-    /// All kernels of a plan. One workgroup with this number of threads follows the passes.
+    /// All kernels of a plan. One workgroup with this number of threads runs the passes.
     OneDispatch(Arc<[Kernel]>, u32),
     /// Sets the movements of all bodies to zero.
     BeginBodies,
-    /// Writes the rows of contacts that the host computed anew.
+    /// Writes the recomputed rows of contacts.
     WriteContacts,
     /// Writes separations and preloads of all contacts.
     BeginContacts,
@@ -56,7 +56,7 @@ impl Program {
     /// The programs that begin a step from the rows on the device.
     pub const RESIDENT: [Self; 3] = [Self::BeginBodies, Self::WriteContacts, Self::BeginContacts];
 
-    /// Its name in measurements and messages, and of a kernel the name of the file.
+    /// Its name in measurements and messages. For a kernel, it is the name of the file.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Pass(kernel) | Self::Fused(kernel) => kernel.name(),
@@ -67,7 +67,7 @@ impl Program {
         }
     }
 
-    /// Its WGSL.
+    /// Its WGSL text.
     pub fn source(&self) -> String {
         match self {
             Self::Pass(kernel) => {
@@ -88,17 +88,18 @@ impl Program {
     }
 }
 
-/// The rows that a kernel goes over.
+/// The rows of a kernel.
 enum Over {
     /// This number of rows.
     Count(&'static str),
     /// The rows of the colors of a pass.
     Colors,
-    /// The rows that the kernel finds itself.
+    /// The kernel finds its rows itself.
     Own,
 }
 
-/// The files of a kernel, its rows, and the call of its function: for one `row`, or for all where the kernel finds its rows.
+/// The files of a kernel, its rows, and the call of its function: for one `row`, or for all rows if the kernel finds
+/// them itself.
 fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
     let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
     match kernel {
@@ -175,7 +176,7 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
     }
 }
 
-/// A constant of the struct `Rules` of `lib/rules.wgsl`.
+/// The rules as a constant of the struct `Rules` of `lib/rules.wgsl`.
 fn rules_text(rules: Rules) -> String {
     let Rules {
         biased,
@@ -204,11 +205,11 @@ fn rules_text(rules: Rules) -> String {
     )
 }
 
-/// The WGSL of some kernels. `range` is the WGSL of the colors of a pass where the colors are `fused`, and else of the places of its
-/// rows; `main` makes the body of the entry point of the calls.
+/// The WGSL of some kernels. `range` is the WGSL for the colors of a pass if the colors are `fused`, otherwise for the
+/// places of its rows. `main` turns the calls into the body of the entry point.
 fn of_plan(kernels: &[Kernel], threads: u32, fused: bool, range: &str, main: impl Fn(&[String]) -> String) -> String {
-    // A stage has at most eight storage buffers: `convergence` is one of them only where a kernel measures corrections, and `free` only
-    // where a kernel reads it.
+    // A stage has at most eight storage buffers. `convergence` is one of them only if a kernel measures corrections,
+    // and `free` only if a kernel reads it.
     let is_measured = kernels.iter().any(|kernel| kernel.is_measured());
     let reads_start = kernels.iter().any(|kernel| kernel.reads_start());
     let mut parts = vec![
@@ -242,7 +243,7 @@ fn of_plan(kernels: &[Kernel], threads: u32, fused: bool, range: &str, main: imp
     text(true, threads, &parts, &loops, &main(&calls))
 }
 
-/// The WGSL of a program that begins a step: a function that is called for each of `count` rows.
+/// The WGSL of a program that begins a step: it calls a function for each of `count` rows.
 fn of_begin(own: &[&str], function: &str, count: &str) -> String {
     let main = over_count(&format!("resident.{count}"), &format!("{function}(row)"));
     let parts = [&[part!("lib/types"), part!("lib/math")], own].concat();
@@ -253,7 +254,7 @@ fn over_count(count: &str, call: &str) -> String {
     format!("for (var row = first; row < {count}; row += stride) {{ {call}; }}")
 }
 
-/// All threads follow the passes, with a barrier after each pass.
+/// All threads run the passes, with a barrier after each pass.
 fn follow_passes(calls: &[String]) -> String {
     let mut cases = String::new();
     for (at, call) in calls.iter().enumerate() {
@@ -270,8 +271,8 @@ fn follow_passes(calls: &[String]) -> String {
     )
 }
 
-/// A shader: constants, buffers, parts, and an entry point with the body `main`. In `main` the first row of a thread is `first`, and
-/// its rows are `stride` apart.
+/// A shader: constants, buffers, parts, and an entry point with the body `main`. In `main` the first row of a thread is
+/// `first`, and its rows are `stride` apart.
 fn text(of_plan: bool, threads: u32, parts: &[&str], loops: &str, main: &str) -> String {
     let (buffers, parts) = (declarations(of_plan), parts.join("\n"));
     format!(

@@ -1,10 +1,11 @@
-//! Exact mode in WGSL, where no SPIR-V can be handed over: sums and products that integers steer.
+//! Exact mode in WGSL, for adapters that do not accept SPIR-V: integers guard sums and products.
 //!
-//! WGSL lets a compiler reassociate and fuse what it can see. Here every sum, difference and product goes through an exclusive or of its
-//! bits with an integer that the host sets to 0. No compiler knows that number, so each result is rounded before anything uses it.
-//! Choices between numbers go through integers too: a compiler may else read a minimum or maximum in them, whose signed zeros are free.
-//! So do zeros: a compiler may else take 0 for the product of 0 and x, and x for the sum of 0 and x, whatever their signs. And signs: the
-//! opposite of 0 may else be 0.
+//! WGSL allows a compiler to reassociate and to fuse operations. Here every sum, difference and product passes through
+//! an exclusive or of its bits with an integer that the host sets to 0. No compiler knows that value, so each result is
+//! rounded before its use. Selects between floats also go through integers: a compiler could turn them into a minimum
+//! or maximum, which may return either signed zero. Zeros are guarded too: a compiler could replace the product of 0
+//! and x by 0, and the sum of 0 and x by x, without regard to signs. Signs are guarded as well: otherwise the negation
+//! of 0 could be 0.
 
 use std::ops::Range;
 
@@ -14,11 +15,11 @@ use naga::{BinaryOperator, Expression, Handle, ScalarKind, TypeInner, UnaryOpera
 use super::bindings::Binding;
 use super::reflect::Reflected;
 
-/// The functions that steer, for one number and for vectors of two to four.
+/// The guard functions, for one number and for vectors of two to four.
 const STEERED: [(&str, &str, &str); 4] =
     [("1", "f32", "u32"), ("2", "vec2f", "vec2u"), ("3", "vec3f", "vec3u"), ("4", "vec4f", "vec4u")];
 
-/// The same program, computed as written by any compiler that keeps the laws of integers.
+/// The same program. Any compiler that respects integer arithmetic computes it as written.
 pub fn exact_wgsl(reflected: &Reflected, source: &str) -> String {
     let mut edits = Edits(Vec::new());
     let module = &reflected.module;
@@ -44,7 +45,7 @@ pub fn exact_wgsl(reflected: &Reflected, source: &str) -> String {
     edits.apply(source) + &functions_of(zero(reflected))
 }
 
-/// How many floats a value has; none if it has others.
+/// Number of floats in a value, or `None` for other types.
 fn floats(ty: &TypeResolution, module: &naga::Module) -> Option<usize> {
     match *ty.inner_with(&module.types) {
         TypeInner::Scalar(scalar) if scalar.kind == ScalarKind::Float => Some(1),
@@ -53,7 +54,7 @@ fn floats(ty: &TypeResolution, module: &naga::Module) -> Option<usize> {
     }
 }
 
-/// The number of a program that the host sets to 0.
+/// The name of the program's number that the host sets to 0.
 fn zero(reflected: &Reflected) -> &'static str {
     if reflected.bindings.contains(&Binding::Resident) { "resident.zero" } else { "params.zero" }
 }
@@ -77,10 +78,10 @@ struct Edits(Vec<Edit>);
 
 struct Edit {
     at: usize,
-    /// How many bytes the new text takes the place of.
+    /// Number of bytes that the new text replaces.
     length: usize,
     new: String,
-    /// Where the expression ends: of two that begin at one place the longer one is the outer one.
+    /// The end of the expression. Of two expressions with the same start, the longer one is the outer one.
     end: usize,
 }
 
@@ -89,13 +90,14 @@ impl Edits {
         self.0.push(Edit { at, length, new, end });
     }
 
-    /// Puts the call of a function, whose name and bracket are `open`, around an expression but for its first `cut` bytes.
+    /// Wraps an expression, without its first `cut` bytes, in a function call; `open` is the name of the function with
+    /// its bracket.
     fn wrap(&mut self, Range { start, end }: Range<usize>, cut: usize, open: String) {
         self.add(start, cut, open, end);
         self.add(end, 0, ")".into(), end);
     }
 
-    /// Puts an operation, or an assignment with an operation, through the function that steers it.
+    /// Wraps an operation, or an assignment with an operation, in the guard function.
     fn steer(&mut self, source: &str, Range { start, end }: Range<usize>, op: BinaryOperator, size: usize) {
         let text = &source[start..end];
         let sign = match op {
@@ -114,7 +116,7 @@ impl Edits {
         }
     }
 
-    /// Puts zeros in functions through the functions that steer, but for those that a number is compared with.
+    /// Wraps zeros in functions in the guard functions, except zeros that a number is compared with.
     fn steer_zeros(&mut self, source: &str) {
         for (zero, size) in [("0.0", 1), ("vec2f()", 2), ("vec3f()", 3), ("vec4f()", 4)] {
             for (at, _) in source.match_indices(zero) {

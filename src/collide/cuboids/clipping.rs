@@ -1,4 +1,4 @@
-//! The second stage: where the faces of near cuboids touch.
+//! The second stage: the contact points of near cuboids.
 
 use std::ops::Range;
 use std::sync::{LazyLock, Mutex};
@@ -13,27 +13,27 @@ use super::{Near, is_small};
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Vec3, cross3, dot3, vec3};
 
-/// Places where two faces can touch: four corners of the first, four of the second, and sixteen crossings of their sides.
+/// Candidate points of two faces: four corners of the first, four of the second, and sixteen crossings of their sides.
 const PLACES: usize = 24;
 
-/// What the second stage finds of a group of pairs.
+/// Results of the second stage for a group of pairs.
 #[derive(Default)]
 pub(super) struct Clipped {
-    /// Bit k of the whole number says whether the faces touch at place k.
+    /// As an integer, bit k says whether the faces touch at candidate point k.
     touching: Wide,
-    /// Distance at each place (m).
+    /// Distance at each candidate point (m).
     distances: [Wide; PLACES],
-    /// How far along the sides of the first and the second face each crossing lies.
+    /// Position of each crossing along the sides of the first and the second face.
     shares: [[Wide; 2]; 16],
-    /// Corners of the two faces, as seen from the first cuboid.
+    /// Corners of the two faces, in the frame of the first cuboid.
     corners: [[[Wide; 3]; 4]; 2],
-    /// Which face of each cuboid it is.
+    /// Index of the face of each cuboid.
     faces: [Wide; 2],
-    /// From the second to the first, as seen from the second.
+    /// Direction from the second to the first, in the frame of the second.
     back: [Wide; 3],
 }
 
-/// The stage over pairs that are near.
+/// The stage for pairs that are near.
 pub(super) struct Clipping<'a> {
     pub near: &'a [Near],
     pub clipped: Mutex<&'a mut Clipped>,
@@ -58,7 +58,7 @@ impl Work for Clipping<'_> {
 /// A face of each cuboid.
 struct Face<L> {
     corners: [Vec3<L>; 4],
-    /// The same, as seen along the normal of the contact.
+    /// The corners, projected along the normal of the contact.
     flat: [[L; 2]; 4],
     number: L,
 }
@@ -66,11 +66,11 @@ struct Face<L> {
 #[inline(always)]
 fn clip<L: Lanes>(pose: Pose<L>, normal: Vec3<L>, half: [Vec3<L>; 2], clipped: &mut Clipped) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    // The square of the area of a parallelogram up to which parry takes its sides as parallel.
+    // Parry treats sides as parallel if the squared area of their parallelogram is at most this.
     let flat = L::select(L::constant(f64::from(f32::EPSILON)), zero, is_small(half[0], half[1]));
     let turn = Turn::of(pose.rotation);
     let back = Turn::of(backwards(pose.rotation)).of_vector(negative(normal));
-    // parry's basis of the plane.
+    // Parry's basis of the plane.
     let sign = one.with_sign(normal.z);
     let a = (-one).divided_by(sign + normal.z);
     let b = normal.x * normal.y * a;
@@ -112,7 +112,7 @@ fn clip<L: Lanes>(pose: Pose<L>, normal: Vec3<L>, half: [Vec3<L>; 2], clipped: &
             let denominator = ae - bb;
             let s = (b * f - c * e).divided_by(denominator);
             let t = (b * s + f).divided_by(e);
-            // Not parallel: by more than four floats.
+            // Not parallel, by more than four floats.
             let is_crossing = L::and(denominator.gt(flat), ae.floats_below(4).gt(bb));
             let is_within = L::and(L::and(s.gt(zero), one.gt(s)), L::and(t.gt(zero), one.gt(t)));
             touching = touching + L::select(zero, L::constant(bit), L::and(is_crossing, is_within));
@@ -137,7 +137,7 @@ fn stored<L: Lanes>(v: Vec3<L>) -> [Wide; 3] {
     [v.x.store(), v.y.store(), v.z.store()]
 }
 
-/// The face that lies best across a direction; its corners in parry's order.
+/// The face that is most perpendicular to a direction, with its corners in parry's order.
 #[inline(always)]
 fn face<L: Lanes>(half: Vec3<L>, direction: Vec3<L>) -> Face<L> {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
@@ -146,7 +146,7 @@ fn face<L: Lanes>(half: Vec3<L>, direction: Vec3<L>) -> Face<L> {
     let is_z = along.z.gt(L::select(along.x, along.y, is_y));
     let chosen = L::select(L::select(direction.x, direction.y, is_y), direction.z, is_z);
     let sign = one.with_sign(chosen);
-    // One where the face lies across that axis.
+    // 1 if the face is perpendicular to that axis.
     let z = L::select(zero, one, is_z);
     let y = L::select(L::select(zero, one, is_y), zero, is_z);
     let (across_y, across_z) = (y.gt(zero), z.gt(zero));
@@ -156,7 +156,7 @@ fn face<L: Lanes>(half: Vec3<L>, direction: Vec3<L>) -> Face<L> {
     let (x_plus, x_minus) = (L::select(plus.x, signed.x, across_x), L::select(minus.x, signed.x, across_x));
     let (y_plus, y_minus) = (L::select(plus.y, signed.y, across_y), L::select(minus.y, signed.y, across_y));
     let (z_plus, z_minus) = (L::select(plus.z, signed.z, across_z), L::select(minus.z, signed.z, across_z));
-    // Around the face: y first, then z or x; x first where the face lies across y.
+    // Order around the face: y first, then z or x; x first if the face is perpendicular to y.
     let corners = [
         vec3(x_plus, y_plus, z_plus),
         vec3(L::select(x_plus, x_minus, across_y), y_minus, z_plus),
@@ -167,7 +167,8 @@ fn face<L: Lanes>(half: Vec3<L>, direction: Vec3<L>) -> Face<L> {
     Face { corners, flat: [[zero; 2]; 4], number }
 }
 
-/// Whether a point lies outside of a polygon: 0 or 1. parry's rule, which counts what lies on the line of the last side by the other sides.
+/// Whether a point is outside a polygon: 0 or 1. By parry's rule, the other sides decide about a point on the line of
+/// the last side.
 #[inline(always)]
 fn outside<L: Lanes>(point: [L; 2], polygon: &[[L; 2]; 4]) -> L {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));

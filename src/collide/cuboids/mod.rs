@@ -1,12 +1,13 @@
-//! The contacts of cuboids, sixteen pairs at a time: bit by bit what parry's `contact_manifold_cuboid_cuboid` says of each pair.
-//! Where a half extent is below [`SMALL`], it is what parry says of a pair many times as large: parry's tolerances are lengths.
+//! The contacts of cuboids, sixteen pairs at a time, bit for bit equal to parry's `contact_manifold_cuboid_cuboid` for
+//! each pair. A pair with a half extent below [`SMALL`] gets parry's result for an enlarged pair, because parry's
+//! tolerances are absolute lengths.
 //!
-//! parry tests the three faces of either cuboid and the nine directions across two edges, and takes the one along which the
-//! cuboids are furthest apart. Then it clips the two faces that lie best across that direction. Both stages are the same arithmetic for
-//! every pair, and branches become choices. Only pairs that are near go on to the second stage: of those that a falling pile computes
-//! about half.
+//! Parry tests the three face normals of each cuboid and the nine cross products of edges, and takes the direction
+//! along which the cuboids are furthest apart. Then it clips the two faces that are most perpendicular to that
+//! direction. Both stages run the same arithmetic for every pair, with selects in place of branches. Only near pairs
+//! reach the second stage: about half of the computed pairs in a falling pile.
 //!
-//! No closures in what is over lanes: a closure would be compiled for the plain instruction set.
+//! Code over lanes uses no closures: a closure would be compiled for the plain instruction set.
 
 mod clipping;
 mod separation;
@@ -22,33 +23,33 @@ use super::solid::{ParryManifold, SMALL};
 use crate::lanes::{InstructionSet, Lanes, Row8, WIDTH};
 use crate::math::Vec3;
 
-/// Two cuboids to be compared.
+/// Two cuboids to test.
 #[derive(Clone, Copy)]
 pub(super) struct CuboidPair {
     /// The bodies.
     pub bodies: [u32; 2],
-    /// Places in the list of cuboids.
+    /// Indices in the list of cuboids.
     pub cuboids: [u32; 2],
-    /// Distance up to which contacts are sought (m).
+    /// Largest distance of a contact (m).
     pub prediction: f32,
-    /// A number of the caller's.
+    /// A number for the caller.
     pub number: u32,
 }
 
-/// Memory for the stages.
+/// Reusable memory of the stages.
 #[derive(Default)]
 pub(super) struct CuboidScratch {
     near: Vec<Near>,
     clipped: Clipped,
 }
 
-/// A pair that is no further apart than its prediction.
+/// A pair whose distance is at most its prediction.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Near {
-    /// The second cuboid as seen from the first: rotation, place; then the last half extent of the second.
+    /// The second cuboid in the frame of the first: rotation, position, then the last half extent of the second.
     pose: Row8,
-    /// Direction from the first to the second, half extents of the first, and the two others of the second.
+    /// Direction from the first to the second, half extents of the first, and the two other half extents of the second.
     direction: Row8,
     number: u32,
     rest: [u32; 7],
@@ -57,8 +58,8 @@ struct Near {
 /// Writes the contact of a pair.
 type WriteContact<'a> = dyn Fn(&mut ParryManifold) + 'a;
 
-/// Calls `with` on the number and the contact of each of `pairs`, in the order of the pairs; pairs that are further apart than
-/// their predictions have none.
+/// Calls `with` on the number and the contact of each of `pairs`, in order. A pair gets no call if its distance exceeds
+/// its prediction.
 pub(super) fn cuboid_contacts(
     set: InstructionSet,
     bodies: &[BodyState],
@@ -78,7 +79,7 @@ pub(super) fn cuboid_contacts(
     }
 }
 
-/// Whether the thinner of two cuboids with these half extents is so thin that parry's tolerances would show.
+/// Whether the thinner of two cuboids with these half extents is thin enough for parry's tolerances to matter.
 #[inline(always)]
 fn is_small<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>) -> L::Mask {
     let thickness_1 = L::smaller(L::smaller(half_1.x, half_1.y), half_1.z);

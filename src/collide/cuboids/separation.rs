@@ -1,4 +1,4 @@
-//! The first stage: along which direction cuboids are furthest apart, and whether they are near.
+//! The first stage: the direction along which cuboids are furthest apart, and whether they are near.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -9,7 +9,7 @@ use super::{CuboidPair, Near, is_small};
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Quat, Vec3, dot3, vec3};
 
-/// The stage over all pairs; adds those that are near to `near`.
+/// The stage for all pairs. It adds near pairs to `near`.
 pub(super) struct Separation<'a> {
     pub bodies: &'a [BodyState],
     pub cuboids: &'a [CuboidPlace],
@@ -56,7 +56,7 @@ impl Work for Separation<'_> {
 }
 
 impl Separation<'_> {
-    /// Where the cuboids are, and their half extents.
+    /// Poses and half extents of the cuboids.
     #[inline(always)]
     fn side<L: Lanes>(&self, bodies: &[u32; WIDTH], cuboids: &[u32; WIDTH]) -> (Pose<L>, Vec3<L>) {
         let q = columns::<L, _>(self.bodies, POSE, bodies);
@@ -68,28 +68,29 @@ impl Separation<'_> {
     }
 }
 
-/// The largest distance of two cuboids over parry's directions, and that direction.
+/// The largest distance of two cuboids over parry's directions, and its direction.
 #[inline(always)]
 fn separation<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L, Vec3<L>) {
     let (distance_1, direction_1) = across_faces(half_1, half_2, pose);
     let (distance_2, direction_2) = across_faces(half_2, half_1, pose.inverse());
     let (distance_3, direction_3) = across_edges(half_1, half_2, pose);
     let from_2 = Turn::of(pose.rotation).of_vector(negative(direction_2));
-    // Which is best, and in parry's order where two are as good.
+    // Pick the best direction, and the first one in parry's order if two are equal.
     let is_third = distance_3.gt(distance_1);
     let is_second = L::and(distance_2.gt(distance_1), distance_2.gt(distance_3));
     let direction = choose(choose(direction_1, direction_3, is_third), from_2, is_second);
     (L::larger(L::larger(distance_1, distance_2), distance_3), direction)
 }
 
-/// The distance across the best face of the first cuboid; between those of several, if the second lies beyond several.
+/// The distance across the best face of the first cuboid. If the second lies beyond several faces, the direction is
+/// between their normals.
 #[inline(always)]
 fn across_faces<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L, Vec3<L>) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let (turn, back) = (Turn::of(pose.rotation), Turn::of(backwards(pose.rotation)));
     let place = [pose.at.x, pose.at.y, pose.at.z];
     let half = [half_1.x, half_1.y, half_1.z];
-    // Instead of a distance of zero: parry's length, and for small cuboids one whose square is just a number.
+    // Replaces a distance of zero: parry's length, or for small cuboids one whose square is just above underflow.
     let least = L::select(L::constant(f64::from(f32::EPSILON)), L::constant(1e-15), is_small(half_1, half_2));
     let mut best = (L::constant(f64::from(f32::MIN)), vec3(zero, zero, zero));
     let (mut sum, mut beyond) = ([zero; 3], zero);

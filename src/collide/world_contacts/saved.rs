@@ -1,8 +1,9 @@
 //! The contacts of one world as bytes.
 //!
-//! Most of it follows from little: a manifold from where its bodies were when it was computed, and from the distance up to which contacts
-//! were predicted. The places of bodies tell the centers of mass, so that only manifolds of bodies whose center is their origin are made
-//! again from that, and the others are written as they are. Builds for tests make them again when they are saved, too, and compare all bits.
+//! Most of this data can be recomputed: a manifold follows from the poses of its bodies when it was computed, and from
+//! the distance of the prediction. Poses are saved by centers of mass, so a manifold is recomputed only if the center
+//! of each body is its origin; other manifolds are saved in full. Test builds also recompute manifolds while saving,
+//! and compare all bits.
 
 mod pairs;
 mod places;
@@ -22,14 +23,14 @@ use crate::world::{Body, Collider, World};
 pub(in crate::collide) struct PlacedBody<'a> {
     pub index: u32,
     pub colliders: ColliderRange,
-    /// The body as it is in the world now, if it is there.
+    /// The present body, if it is in the world.
     pub body: Option<&'a Body>,
-    /// Whether its colliders are those that it has in the world.
+    /// Whether its colliders are those of the body in the world.
     pub is_current: bool,
 }
 
 impl WorldContacts {
-    /// The places of colliders, and what waits for the next detection.
+    /// The places of colliders, and pending work for the next detection.
     pub fn walk_places<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         let Self {
             colliders,

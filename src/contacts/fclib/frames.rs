@@ -1,27 +1,29 @@
-//! From rows of a Jacobian in a body's own axes to arms in the world's.
+//! Computes arms in world axes from the rows of a Jacobian in a body's own axes.
 //!
-//! A contact at the arm r with the directions D (rows d_i) has the linear rows D and the angular rows Rᵀ(r x d_i), with R the
-//! rotation of the body, which no file names. So K = D⁻¹ B, B the angular rows, is -[r]x R: r is what Kᵀ takes to zero, and
-//! |r|² = |K|²/2. For either sign of r there is one rotation, which Kᵀx = Rᵀ(r x x) gives on the plane across r; the right sign
-//! is the one with which all contacts of a body are at one rotation.
+//! A contact at the arm r with the directions D (rows d_i) has the linear rows D and the angular rows Rᵀ(r x d_i). R is
+//! the rotation of the body, which the file does not contain. With the angular rows B, K = D⁻¹ B is -[r]x R: Kᵀ takes r
+//! to zero, and |r|² = |K|²/2. For each sign of r there is one rotation, which Kᵀx = Rᵀ(r x x) determines on the plane
+//! across r. The right sign is the one for which all contacts of a body have the same rotation.
 
 use glam::{DMat3, DQuat, DVec3};
 
-/// How far, relative to the largest, rows may be from those of arms. Files that were written in f64 are at 1e-13.
+/// Tolerance between the rows and those of arms, relative to the largest. Files that were written in f64 reach 1e-13.
 const TOLERANCE: f64 = 1e-6;
 
-/// A contact as one of its bodies sees it.
+/// A contact seen from one of its bodies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lever {
     /// K.
     pub map: DMat3,
-    /// Away from the body, along the normal.
+    /// The normal, away from the body.
     pub outward: DVec3,
 }
 
-/// The rotation of a body from its own axes to the world's, from all of its contacts; none if they are not at one.
+/// The rotation of a body from its own axes to the world's, from all of its contacts. Returns `None` if the contacts do
+/// not agree.
 ///
-/// Where all of them lie on one line through the center, either sign fits. Arms are then taken to point out of the body.
+/// If all contacts lie on one line through the center, either sign fits. Arms are then assumed to point out of the
+/// body.
 pub(super) fn rotation(levers: &[Lever]) -> Option<DMat3> {
     let longest = levers.iter().max_by(|a, b| size(a.map).total_cmp(&size(b.map)));
     let Some(longest) = longest.filter(|l| size(l.map) > 0.0) else { return Some(DMat3::IDENTITY) };
@@ -54,7 +56,7 @@ pub(super) fn arm(map: DMat3, rotation: DMat3) -> DVec3 {
 
 /// The two rotations that one contact allows, by the sign of its arm.
 fn candidates(map: DMat3) -> [DMat3; 2] {
-    // Any two columns are across r; the two that span most say where it points.
+    // Any two columns are perpendicular to r. Use the two with the largest cross product.
     let columns = [map.x_axis, map.y_axis, map.z_axis];
     let across = [(0, 1), (1, 2), (2, 0)].map(|(i, j): (usize, usize)| columns[i].cross(columns[j]));
     let along = across.into_iter().max_by(|a, b| a.length().total_cmp(&b.length())).expect("three of them");
@@ -112,7 +114,7 @@ mod tests {
             let found = rotation(&[lever]).expect("a rotation");
             let r = arm(lever.map, found);
             assert!(r.dot(outward) > 0.0 && (r.length() - ARMS[0].length()).abs() < 1e-14);
-            // Either way the rows are the same: only their product counts.
+            // Either way the rows are the same: only the product matters.
             let turned = super::tests::lever(r, found, outward);
             assert!(far(turned.map, lever.map) < 1e-14);
         }

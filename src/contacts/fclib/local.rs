@@ -9,7 +9,7 @@ use crate::contacts::LocalProblem;
 use crate::error::{Error, Result};
 
 impl LocalProblem {
-    /// From an open FCLIB file with a local problem in space.
+    /// Reads an open FCLIB file with a local problem in space.
     pub(super) fn from_tables(tables: &Tables) -> Result<Self> {
         let dimensions = tables.number("fclib_local/spacedim")?;
         if dimensions != 3 {
@@ -33,7 +33,7 @@ fn blocks(w: &Sparse) -> Result<Vec<Vec<(u32, DMat3)>>> {
         let (rows, columns) = (w.rows, w.columns);
         return Err(Error::input(format!("{rows} x {columns}: contacts have 3 rows and columns each")));
     }
-    // Before as much memory is asked for.
+    // Check before memory is allocated.
     if w.entries.len() < w.rows {
         return Err(Error::input(format!("{} entries for {} rows: a contact is empty", w.entries.len(), w.rows)));
     }
@@ -107,7 +107,7 @@ mod tests {
             assert!(u.distance(expected) < 1e-12 * expected.length(), "contact {i}: {u}, not {expected}");
             assert_eq!(local.friction[i], problem.contacts[i].friction);
         }
-        // Contacts of different bodies do not meet, and those of one color least of all.
+        // Contacts of different bodies are not coupled, least of all those of one color.
         assert!(local.rows.iter().any(|row| row.len() < impulses.len()), "W is full");
         for color in local.colors() {
             let meets = |i: &u32| local.rows[*i as usize].iter().any(|(j, _)| j != i && color.contains(j));
@@ -115,7 +115,7 @@ mod tests {
         }
     }
 
-    /// What is done to a file, and what the error must name.
+    /// A change of a file, and the dataset that the error must name.
     #[test]
     fn a_bad_local_file_is_refused_in_one_line_that_names_the_dataset() {
         use Data::{Real, Whole};
@@ -157,6 +157,6 @@ mod tests {
         let rolling = Problem::from_fclib(bytes(&good, "fclib_local_rolling")).expect_err("refused").to_string();
         assert_eq!(rolling, "fclib_local_rolling: rolling friction cannot be read");
         let bodies = ContactProblem::from_fclib(bytes(&good, "fclib_local")).expect_err("refused").to_string();
-        assert_eq!(bodies, "fclib_local: has no bodies, and bodies are needed");
+        assert_eq!(bodies, "fclib_local: has no bodies, but bodies are needed");
     }
 }

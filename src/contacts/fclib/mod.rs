@@ -5,9 +5,10 @@
 //! u = W r + q          three rows and columns of W a contact
 //! ```
 //!
-//! Rigid bodies are six rows each, three of the velocity of the center of mass and three of the angular velocity in the body's
-//! own axes. The files do not say how a body is turned; [`frames`] finds a rotation with which all of its contacts have arms.
-//! Written files have the world's axes for the body's, and H and M as entries by row and column.
+//! A rigid body has six rows: three for the velocity of the center of mass and three for the angular velocity in the
+//! body's own axes. The files do not contain the rotation of a body; [`frames`] finds a rotation at which all its
+//! contacts have arms. In written files, the axes of each body are the world's, and H and M are entries by row and
+//! column.
 
 mod frames;
 mod local;
@@ -23,10 +24,10 @@ use crate::error::{Error, Result, ensure, input};
 use frames::{Lever, arm, rotation};
 use table::{Global, Sparse, Tables};
 
-/// How far rows that should be opposite or equal may be apart, relative to the larger.
+/// Tolerance between rows that should be opposite or equal, relative to the larger.
 const TOLERANCE: f64 = 1e-9;
 
-/// The rows of H of one body in one contact: linear and angular, a direction each.
+/// The rows of H of one body in one contact: linear and angular, one for each direction.
 #[derive(Clone, Copy, Debug)]
 struct Rows {
     body: usize,
@@ -35,7 +36,7 @@ struct Rows {
 }
 
 impl Problem {
-    /// From the bytes of an FCLIB file.
+    /// Reads the bytes of an FCLIB file.
     pub(super) fn from_fclib(bytes: Vec<u8>) -> Result<Self> {
         let tables = Tables::open(bytes)?;
         if tables.has("fclib_global") {
@@ -53,11 +54,11 @@ impl Problem {
 }
 
 impl ContactProblem {
-    /// From the bytes of an FCLIB file with a global problem of rigid bodies in space.
+    /// Reads the bytes of an FCLIB file with a global problem of rigid bodies in space.
     pub(super) fn from_fclib(bytes: Vec<u8>) -> Result<Self> {
         match Problem::from_fclib(bytes)? {
             Problem::Bodies(problem) => Ok(problem),
-            Problem::Blocks(_) => Err(Error::input("fclib_local: has no bodies, and bodies are needed")),
+            Problem::Blocks(_) => Err(Error::input("fclib_local: has no bodies, but bodies are needed")),
         }
     }
 
@@ -77,7 +78,7 @@ impl ContactProblem {
         let free = vectors(&f);
         let body = |(i, block): (usize, &Block)| {
             let turn = turns[i];
-            // Unsymmetric inertia is data: it shows in the free velocity, and its symmetric part is what contacts feel.
+            // An asymmetric inertia is valid data: it affects the free velocity, and contacts see its symmetric part.
             let inertia = (block.angular + block.angular.transpose()) * 0.5;
             let free = Velocity {
                 linear: free[2 * i] / block.mass,
@@ -105,10 +106,10 @@ impl ContactProblem {
         })
     }
 
-    /// As the bytes of an FCLIB file, global form.
+    /// Writes the bytes of an FCLIB file in global form.
     ///
     /// # Errors
-    /// It is too large for the 32-bit indices of the format.
+    /// The problem is too large for the 32-bit indices of the format.
     pub fn to_fclib(&self) -> Result<Vec<u8>> {
         let mut m = Sparse { rows: 6 * self.bodies.len(), columns: 6 * self.bodies.len(), entries: Vec::new() };
         let mut f = Vec::new();
@@ -136,7 +137,7 @@ impl ContactProblem {
     }
 }
 
-/// Mass and inertia of one body, its own axes.
+/// Mass and inertia of one body, in its own axes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Block {
     mass: f64,
@@ -149,7 +150,7 @@ fn mass_blocks(m: &Sparse) -> Result<Vec<Block>> {
         let (rows, columns) = (m.rows, m.columns);
         return Err(input!("{rows} x {columns}: rigid bodies have 6 rows and columns each"));
     }
-    // Before as much memory is asked for.
+    // Check before memory is allocated.
     let (entries, rows) = (m.entries.len(), m.rows);
     ensure(entries >= rows, || format!("{entries} entries for {rows} rows: a mass is missing"))?;
     let mut entries = vec![[[0.0; 6]; 6]; m.rows / 6];
@@ -166,7 +167,7 @@ fn mass_blocks(m: &Sparse) -> Result<Vec<Block>> {
             let expected = if row == column { mass } else { 0.0 };
             (e[row][column] - expected).abs() <= TOLERANCE * mass.abs()
         };
-        // Velocity and angular velocity do not meet in a center of mass.
+        // Velocity and angular velocity are not coupled at a center of mass.
         let apart = |(row, column): (usize, usize)| e[row][column + 3] == 0.0 && e[row + 3][column] == 0.0;
         if !axes().all(|at| scalar(at) && apart(at)) {
             return wrong("its rows are not one mass and an inertia".into());
@@ -180,7 +181,7 @@ fn mass_blocks(m: &Sparse) -> Result<Vec<Block>> {
     entries.iter().enumerate().map(block).collect()
 }
 
-/// The two sides of a contact; the frame of b is right-handed, that of a opposite.
+/// The two sides of a contact. The frame of b is right-handed, and that of a is its opposite.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sides {
     a: Option<Rows>,
@@ -197,7 +198,7 @@ impl Sides {
     }
 }
 
-/// H of contacts between at most two rigid bodies.
+/// H of contacts, each between at most two rigid bodies.
 fn contact_rows(h: &Sparse, rows: usize) -> Result<Vec<Sides>> {
     if h.rows != rows || !h.columns.is_multiple_of(3) {
         let (found, columns) = (h.rows, h.columns);
@@ -252,11 +253,11 @@ fn map(rows: &Rows) -> DMat3 {
     directions(rows).inverse() * DMat3::from_cols(n, t_1, t_2).transpose()
 }
 
-/// The rotation of each body; its own axes for one without contacts.
+/// The rotation of each body; the identity for a body without contacts.
 fn rotations(bodies: usize, contacts: &[Sides]) -> Result<Vec<DMat3>> {
     let mut levers = vec![Vec::new(); bodies];
     for side in contacts.iter().flat_map(|c| [c.a, c.b]).flatten() {
-        // The normal points from a to b, so the rows of either side, -n on a and n on b, point into the body.
+        // The normal points from a to b. The rows of both sides, -n on a and n on b, point into the body.
         levers[side.body].push(Lever { map: map(&side), outward: -side.linear[0] });
     }
     let of = |(i, levers): (usize, &Vec<Lever>)| {

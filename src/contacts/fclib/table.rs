@@ -4,7 +4,7 @@ use hdf5_pure::{Dataset, File, FileBuilder, GroupBuilder, LibVer};
 
 use crate::error::{Error, Result, ensure, input};
 
-/// An open file; every error names the dataset.
+/// An open file. Every error names the dataset.
 pub(super) struct Tables {
     file: File,
 }
@@ -13,13 +13,13 @@ impl Tables {
     pub(super) fn open(bytes: Vec<u8>) -> Result<Self> {
         let length = bytes.len() as u64;
         let file = File::from_bytes(bytes).map_err(|e| input!("not a whole HDF5 file: {e}"))?;
-        // Else what comes last, and may be left out, would not be missed.
+        // Otherwise a missing end would remain unnoticed, if it holds only optional data.
         let whole = file.superblock().eof_address;
         ensure(length >= whole, || format!("not a whole HDF5 file: {length} of {whole} bytes"))?;
         Ok(Self { file })
     }
 
-    /// Whether there is a group of that name.
+    /// Whether a group of that name exists.
     pub(super) fn has(&self, group: &str) -> bool {
         self.file.group(group).is_ok()
     }
@@ -35,12 +35,12 @@ impl Tables {
         Ok(self.whole(path, 1)?[0])
     }
 
-    /// So many whole numbers.
+    /// Reads `count` whole numbers.
     fn whole(&self, path: &str, count: usize) -> Result<Vec<i64>> {
         self.read(path, count, |d| d.read_i64())
     }
 
-    /// So many numbers, all finite.
+    /// Reads `count` numbers, all finite.
     pub(super) fn reals(&self, path: &str, count: usize) -> Result<Vec<f64>> {
         let numbers = self.read(path, count, |d| d.read_f64())?;
         match numbers.iter().position(|x| !x.is_finite()) {
@@ -49,7 +49,7 @@ impl Tables {
         }
     }
 
-    /// So many friction coefficients.
+    /// Reads `count` friction coefficients.
     pub(super) fn frictions(&self, path: &str, count: usize) -> Result<Vec<f64>> {
         let mu = self.reals(path, count)?;
         match mu.iter().position(|&mu| mu < 0.0) {
@@ -67,7 +67,7 @@ impl Tables {
         let wrong = |e: hdf5_pure::Error| input!("{path}: {e}");
         let dataset = self.file.dataset(path).map_err(wrong)?;
         let shape = dataset.shape().map_err(wrong)?;
-        // Before anything is read, so that a wrong size asks for no memory.
+        // Check before reading: a wrong size must not allocate memory.
         let found = shape.iter().try_fold(1_u64, |all, &n| all.checked_mul(n));
         let message = || format!("{path}: has the shape {shape:?}, and {count} numbers are needed");
         ensure(found == Some(count as u64), message)?;
@@ -76,8 +76,8 @@ impl Tables {
         Ok(numbers)
     }
 
-    /// A sparse matrix, in any of the three forms: `nz` entries by row `i` and column `p`, columns (-1) or rows (-2) one after
-    /// another, each from `p[k]` to `p[k + 1]`.
+    /// A sparse matrix in one of three forms. If `nz` is a count, row `i` and column `p` give the place of each entry.
+    /// With -1 the entries are sorted by columns, and with -2 by rows, each from `p[k]` to `p[k + 1]`.
     pub(super) fn matrix(&self, group: &str) -> Result<Sparse> {
         let path = |name: &str| format!("{group}/{name}");
         let size = |name: &str| {
@@ -111,14 +111,15 @@ impl Tables {
     }
 }
 
-/// Which row or column each entry is in, from where each begins; an `nzmax` beyond the last is room that is not used.
+/// The row or column of each entry, from the start of each row or column. If `nzmax` is larger than the number of
+/// entries, the rest is unused.
 fn unfold(pointers: &[i64], count: usize) -> Option<Vec<i64>> {
     let rises = pointers.first() == Some(&0) && pointers.is_sorted() && pointers.last() == Some(&(count as i64));
     let run = |(k, range): (usize, &[i64])| std::iter::repeat_n(k as i64, (range[1] - range[0]) as usize);
     rises.then(|| pointers.windows(2).enumerate().flat_map(run).collect())
 }
 
-/// A sparse matrix: row, column, value. A place that is named twice holds the sum.
+/// A sparse matrix: row, column, value. A place that occurs twice holds the sum.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sparse {
     pub rows: usize,
@@ -127,14 +128,14 @@ pub(super) struct Sparse {
 }
 
 impl Sparse {
-    /// Adds what is not zero.
+    /// Adds a value unless it is zero.
     pub(super) fn push(&mut self, row: usize, column: usize, value: f64) {
         if value != 0.0 {
             self.entries.push((row, column, value));
         }
     }
 
-    /// As entries by row and column: the only form that all readers of the global problem take.
+    /// Writes entries by row and column. No other form is readable for all readers of the global problem.
     fn write(&self, group: &mut GroupBuilder, name: &str) -> Result<()> {
         let mut matrix = group.create_group(name);
         let index = |i: usize| i32::try_from(i).map_err(|_| input!("{i} does not fit an FCLIB file"));
@@ -164,7 +165,7 @@ pub(super) struct Global<'a> {
 }
 
 impl Global<'_> {
-    /// In the layout of HDF5 1.8, which every reader knows.
+    /// Uses the layout of HDF5 1.8, which every reader supports.
     pub(super) fn to_bytes(&self) -> Result<Vec<u8>> {
         let mut file = FileBuilder::new();
         file.with_libver_bounds(LibVer::Earliest, LibVer::V18);
@@ -181,7 +182,7 @@ impl Global<'_> {
         let description = concat!("contacts of rigid bodies, written by drystone ", env!("CARGO_PKG_VERSION"));
         for (name, text) in [("title", self.title), ("description", description)] {
             let text: String = text.chars().map(|c| if c.is_ascii() && !c.is_control() { c } else { '?' }).collect();
-            // One byte more, for the zero at the end of a string in C.
+            // One more byte for the zero at the end of a C string.
             let width = text.len() as u32 + 1;
             let dataset = info.create_dataset(name).with_ascii_strings_sized(&[&text], width).map_err(Error::input)?;
             dataset.with_shape(&[]);

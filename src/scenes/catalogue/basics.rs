@@ -1,4 +1,4 @@
-//! One body whose motion is known in closed form, and a ball thrown at a stack.
+//! Single bodies whose motion has a closed form, and a ball thrown at a stack.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
-/// A ball of radius 0.5 m, its lowest point `height` above a half-space (m).
+/// A ball of radius 0.5 m. Its lowest point is `height` above a half-space (m).
 pub(super) fn sphere_plane(height: f32) -> Scene {
     let mut world = World::new();
     world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)));
@@ -16,24 +16,25 @@ pub(super) fn sphere_plane(height: f32) -> Scene {
     Scene::new("sphere-plane", world, 300)
 }
 
-/// A flat block on a slope of `degrees`; both have the friction `mu`. Sticks if tan(angle) < mu; else it slides with the
-/// acceleration g (sin(angle) - mu cos(angle)). It is too flat to topple.
+/// A flat block on a slope of `degrees`; both have the friction `mu`. It sticks if tan(angle) < mu; else it slides with
+/// the acceleration g (sin(angle) - mu cos(angle)). It is too flat to topple.
 pub(super) fn slide(degrees: f32, mu: f32) -> Scene {
     let block = Body::dynamic().named("block").shape(Shape::cuboid(0.5, 0.25, 0.5));
     let scene = on_slope("slide", block, 0.25, degrees, mu);
     if libm::tanf(degrees.to_radians()) < mu { scene.standing() } else { scene }
 }
 
-/// A ball on a slope of `degrees`; both have the friction `mu`. Rolls with the acceleration 5/7 g sin(angle) without
-/// slipping if tan(angle) < 7/2 mu.
+/// A ball on a slope of `degrees`; both have the friction `mu`. It rolls with the acceleration 5/7 g sin(angle),
+/// without slipping if tan(angle) < 7/2 mu.
 pub(super) fn roll(degrees: f32, mu: f32) -> Scene {
     let ball = Body::dynamic().named("ball").shape(Shape::ball(0.5));
     on_slope("roll", ball, 0.5, degrees, mu)
 }
 
-/// 25 balls of 1 kg, 2 m apart, on a plate of 10 kg that is pushed by 150 N at `degrees` from x; friction is 0.4 below the
-/// plate and 0.8 on it. The plate slides straight along the push and the balls roll on it: m a = f for each ball, M A = 150 N
-/// - 0.4 (M + 25 m) g - 25 f, and A = 7/2 a where a ball touches. 4 s in steps of 1 ms. Source: SimBenchmark, "rolling".
+/// 25 balls of 1 kg, 2 m apart, on a plate of 10 kg. A force of 150 N pushes the plate at `degrees` from x. Friction is
+/// 0.4 below the plate and 0.8 on it. The plate slides straight along the push and the balls roll on it: m a = f for
+/// each ball, M A = 150 N - 0.4 (M + 25 m) g - 25 f, and A = 7/2 a at each ball. The run takes 4 s in steps of 1 ms.
+/// Source: SimBenchmark, "rolling".
 pub(super) fn rolling(degrees: f32) -> Scene {
     let mut world = World::new();
     world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)).friction(0.2));
@@ -49,7 +50,7 @@ pub(super) fn rolling(degrees: f32) -> Scene {
     Scene { dt: 1e-3, ..Scene::new("rolling", world, 4000) }
 }
 
-/// A body whose center is `height` above a slope that falls towards x.
+/// A body whose center is `height` above a slope that descends towards x.
 pub(super) fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene {
     let angle = degrees.to_radians();
     let mut world = World::new();
@@ -59,8 +60,8 @@ pub(super) fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f3
     Scene::new(name, world, 120)
 }
 
-/// A ball of radius 0.5 m, thrown with a horizontal `speed` (m/s) from 20 m away, meets the middle of a stack of `n`
-/// cubes at the height from which it was thrown.
+/// A ball of radius 0.5 m and a stack of `n` cubes. The ball is thrown with a horizontal `speed` (m/s) from 20 m away.
+/// It hits the middle of the stack at the height of the throw.
 pub(super) fn throw(n: usize, speed: f32) -> Scene {
     const DISTANCE: f32 = 20.0;
     let mut world = floor(40.0, 10.0);

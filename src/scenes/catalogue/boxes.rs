@@ -14,8 +14,8 @@ pub(super) fn pile(n: usize, jitter: f64, seed: u64, ratio: f32) -> Result<Scene
     heap("pile", n, jitter, seed, |i, _| Ok(bodies[i % 2].clone()))
 }
 
-/// The same heap of bodies that are 0.2 to 1 m long along each axis and whose densities are 200 to 5000 kg/m³, at random: boxes, and in turn
-/// the other `kinds` of shapes.
+/// The same heap with random bodies: 0.2 to 1 m long along each axis, with densities of 200 to 5000 kg/m³. Boxes take
+/// turns with the other `kinds` of shapes.
 pub(super) fn pile_mixed(n: usize, jitter: f64, seed: u64, kinds: usize) -> Result<Scene> {
     heap("pile-mixed", n, jitter, seed, |i, random| {
         let [x, y, z, density] = [(0.1, 0.5), (0.1, 0.5), (0.1, 0.5), (200.0, 5000.0)]
@@ -26,7 +26,7 @@ pub(super) fn pile_mixed(n: usize, jitter: f64, seed: u64, kinds: usize) -> Resu
             2 => Shape::capsule(0.5 * y, 0.5 * x),
             3 => Shape::cylinder(y, x),
             4 => Shape::cone(y, x),
-            // An octahedron of which no two edges are alike.
+            // An octahedron whose edges all differ.
             _ => Shape::convex_hull(
                 &[
                     (1.0, 0.0, 0.2),
@@ -54,7 +54,7 @@ fn heap(
     const PITCH: f64 = 1.2;
     const CLEARANCE: f64 = 0.7;
     const LOWEST: f64 = 0.65;
-    // Half of the shift between a layer and the next.
+    // Half of the shift between one layer and the next.
     const SHIFT: f64 = 0.15;
     let side = libm::cbrt(n as f64).round() as usize;
     let layers = n.div_ceil(side * side);
@@ -82,9 +82,9 @@ fn heap(
     Ok(Scene { container, ..Scene::new(name, world, 600) })
 }
 
-/// A turn by up to 0.08 rad about a random axis. Plain arithmetic in f64, so that the bits are the same everywhere.
+/// A random rotation by up to 0.08 rad. Plain f64 arithmetic gives the same bits on every platform.
 fn small_turn(random: &mut SplitMix64) -> Quat {
-    // Tangent of half of the largest angle.
+    // Tangent of half the largest angle.
     const REACH: f64 = 0.04;
     let axis = [(); 3].map(|()| random.symmetric());
     let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
@@ -94,7 +94,7 @@ fn small_turn(random: &mut SplitMix64) -> Quat {
     Quat::from_xyzw(x, y, z, cosine as f32)
 }
 
-/// Distance of neighbors in a row of a pyramid, middle to middle (m).
+/// Distance between centers of neighbors in a row of a pyramid (m).
 const PYRAMID_PITCH: f64 = 1.1;
 
 /// Rows of boxes, each one shorter than the row below it, 0.1 m between neighbors, `gap` of a height between rows.
@@ -104,7 +104,7 @@ pub(super) fn pyramid(base: usize, gap: f32) -> Scene {
     Scene::new("pyramid", world, 300).standing()
 }
 
-/// `n` such pyramids on a square grid, near each other but apart.
+/// `n` such pyramids on a square grid. They are near each other but do not touch.
 pub(super) fn many_pyramids(n: usize, base: usize) -> Scene {
     const DEPTH: f64 = 2.0;
     let side = (n as f64).sqrt().ceil() as usize;
@@ -117,7 +117,7 @@ pub(super) fn many_pyramids(n: usize, base: usize) -> Scene {
     Scene::new("many-pyramids", world, 300).standing()
 }
 
-/// Adds a pyramid, the lowest row's middle at `x` and `z`, with gaps as in [`lifted`].
+/// Adds a pyramid. The middle of its lowest row is at `x` and `z`, and gaps are as in [`lifted`].
 fn add_pyramid(world: &mut World, base: usize, [x, z]: [f64; 2], gap: f32) {
     let body = unit_box();
     for row in 0..base {

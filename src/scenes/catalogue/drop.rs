@@ -1,4 +1,4 @@
-//! The scene with one of every shape.
+//! A scene with every kind of shape.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ const DEPTH: f32 = 6.0;
 /// Cells along each side of the mesh and of the height field.
 const CELLS: u16 = 8;
 
-/// One of every shape in a row along x, `height` above what it falls on: first a floor, then a mesh, then a height field.
+/// Every kind of shape in a row along x, `height` above the surfaces: first a floor, then a mesh, then a height field.
 pub(super) fn drop(height: f32) -> Result<Scene> {
     let mut world = World::new();
     world.add(Body::fixed().named("floor").shape(Shape::half_space(Vec3::Y)));
@@ -28,7 +28,7 @@ pub(super) fn drop(height: f32) -> Result<Scene> {
     place(Body::dynamic().shape(Shape::capsule(0.5, 0.3)).rotation(lying), "capsule", -2.0, 0.3 + height);
     place(Body::dynamic().shape(Shape::cylinder(0.5, 0.4)), "cylinder", -1.0, 0.5 + height);
 
-    // The surface is 0.2 m high on its left side and falls by less than friction holds.
+    // The left side of the surface is 0.2 m high, and its slope is below the friction limit.
     place(Body::fixed().shape(tilted_plate()?), "mesh", 0.5, 0.1);
     place(Body::dynamic().shape(Shape::cuboid(0.5, 0.4, 0.3)), "cuboid", 0.0, 0.6 + height);
     place(Body::dynamic().shape(Shape::cone(0.5, 0.5)), "cone", 1.0, 0.6 + height);
@@ -63,18 +63,18 @@ fn waves() -> Result<Shape> {
     Shape::height_field(&vec![row; usize::from(CELLS) + 1], Vec3::new(2.0 * PITCH, 0.05, DEPTH))
 }
 
-/// Six points, no two edges of equal length.
+/// The hull of six points. No two edges have the same length.
 fn irregular_octahedron() -> Result<Shape> {
     let points =
         [(0.6, 0.0, 0.1), (-0.5, 0.1, 0.0), (0.1, 0.5, 0.0), (0.0, -0.4, 0.1), (0.0, 0.1, 0.6), (0.1, 0.0, -0.5)];
     Shape::convex_hull(&points.map(Vec3::from))
 }
 
-/// Two cubes joined by a bar along x.
+/// Two cubes that a bar along x connects.
 fn dumbbell() -> Body {
     let cube = Shape::cuboid(0.25, 0.25, 0.25);
     let at = |x: f32| Vec3::new(x, 0.0, 0.0);
-    // The bar ends where the cubes begin, so that nothing is counted twice in the mass.
+    // The bar ends at the cubes, so its mass is not counted twice.
     Body::dynamic()
         .shape_at(cube.clone(), at(-0.6), Quat::IDENTITY)
         .shape_at(Shape::cuboid(0.35, 0.1, 0.1), at(0.0), Quat::IDENTITY)
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::world::BodyKind;
 
-    /// Lowest point of the world's axis-aligned box around a body.
+    /// Lowest point of the axis-aligned box around a body.
     fn lowest(body: &Body) -> f32 {
         let boxes = body.colliders.iter().map(|c| {
             let pose = Pose::from_parts(body.position, body.rotation) * Pose::from_parts(c.position, c.rotation);

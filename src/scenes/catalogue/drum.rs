@@ -1,4 +1,4 @@
-//! A turning drum.
+//! A rotating drum.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -11,16 +11,16 @@ use crate::world::{Body, Shape, World};
 
 /// Side of a box (m).
 const SIDE: f32 = 0.2;
-/// Share of the drum that the boxes fill.
+/// Share of the drum's volume in boxes.
 const FILL: f32 = 0.2;
 const STAVES: u16 = 12;
 
-/// `n` boxes of 0.2 m in a hollow drum that turns about the horizontal axis z with `speed` (rad/s): one kinematic body of
-/// twelve staves and two ends, as long inside as its radius, a fifth full.
+/// `n` boxes of 0.2 m in a hollow drum that turns about the horizontal axis z with `speed` (rad/s). The drum is one
+/// kinematic body of twelve staves and two ends. It is as long inside as its radius, and a fifth full.
 pub(super) fn drum(n: usize, speed: f32) -> Scene {
     let mut radius = libm::cbrtf(n as f32 * (SIDE * SIDE * SIDE) / (FILL * TAU / 2.0)).max(5.0 * SIDE);
     let mut places = grid(radius);
-    // In small drums fewer boxes find a place.
+    // A small drum has room for fewer boxes.
     while places.len() < n {
         radius *= 1.05;
         places = grid(radius);
@@ -36,7 +36,7 @@ pub(super) fn drum(n: usize, speed: f32) -> Scene {
     Scene { container: Some((-reach, reach)), ..Scene::new("drum", world, 600) }
 }
 
-/// A drum of this radius inside, around the origin.
+/// A drum with this inner radius, around the origin.
 fn hollow(radius: f32) -> Body {
     // Half of the thickness of staves and ends.
     let half = 0.1 * radius;
@@ -54,7 +54,7 @@ fn hollow(radius: f32) -> Body {
     body
 }
 
-/// Places on a grid of 1.2 sides for boxes that are inside the drum, from below.
+/// Grid places for boxes inside the drum, 1.2 sides apart, in ascending order of height.
 fn grid(radius: f32) -> Vec<Vec3> {
     const PITCH: f32 = 1.2 * SIDE;
     let half = PITCH / 2.0;

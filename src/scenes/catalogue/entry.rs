@@ -1,11 +1,11 @@
-//! An entry of the catalogue: a name, what should hold, parameters.
+//! An entry of the catalogue: a name, a summary of the expected outcome, and parameters.
 
 use crate::error::{Result, input};
 use crate::memory;
 use crate::scenes::scene::Scene;
 use crate::suggest::hint;
 
-/// Most dynamic bodies of a scene of the catalogue.
+/// Largest number of dynamic bodies in a scene of the catalogue.
 pub const MOST_BODIES: f64 = 4e6;
 
 /// A number that shapes a scene of the catalogue.
@@ -22,11 +22,11 @@ pub struct Parameter {
     pub name: &'static str,
     /// Default value.
     pub default: f64,
-    /// Least and greatest value.
+    /// Smallest and largest value.
     pub range: (f64, f64),
     /// Whether it must be a whole number.
     pub whole: bool,
-    /// Words that stand for the whole numbers from 0 on; empty for a plain number.
+    /// Words that stand for the whole numbers from 0; empty for a plain number.
     pub words: &'static [&'static str],
     /// One line: meaning and unit.
     pub summary: &'static str,
@@ -37,7 +37,7 @@ impl Parameter {
         Self { name, default: default as f64, range, whole: true, words: &[], summary }
     }
 
-    /// One of some words, the first by default.
+    /// One of several words, the first by default.
     pub(super) const fn word(name: &'static str, words: &'static [&'static str], summary: &'static str) -> Self {
         Self { name, default: 0.0, range: (0.0, (words.len() - 1) as f64), whole: true, words, summary }
     }
@@ -46,7 +46,7 @@ impl Parameter {
         Self { name, default, range, whole: false, words: &[], summary }
     }
 
-    /// A value as people write it: the word that stands for it, or the number.
+    /// The value as text: its word, if it has one, else the number.
     ///
     /// ```
     /// let family = drystone::scenes::CATALOGUE.iter().find(|entry| entry.name == "family").expect("it is there");
@@ -87,20 +87,20 @@ impl Parameter {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// Name, as [`Scene::find`] knows it.
+    /// Name, for [`Scene::find`].
     pub name: &'static str,
-    /// One line: what it is and what should hold.
+    /// One line: a description and the expected outcome.
     pub summary: &'static str,
     /// Its parameters.
     pub parameters: &'static [Parameter],
-    /// Dynamic bodies for one value of each parameter, in their order.
+    /// Number of dynamic bodies, as a function of the parameter values.
     pub(super) bodies: fn(&[f64]) -> f64,
-    /// Builds the scene from the same values.
+    /// Builds the scene from the parameter values.
     pub(super) build: fn(&[f64]) -> Result<Scene>,
 }
 
 impl Entry {
-    /// Builds the scene. `assignments` are `key=value`; of two for one key the last counts.
+    /// Builds the scene. `assignments` are `key=value`. If a key occurs twice, the last value wins.
     ///
     /// ```
     /// # let pile = drystone::scenes::CATALOGUE.iter().find(|e| e.name == "pile").unwrap();
@@ -110,7 +110,7 @@ impl Entry {
     /// ```
     ///
     /// # Errors
-    /// No `=`, an unknown key, or a value out of its range.
+    /// An assignment has no `=`, an unknown key, or a value out of range.
     pub fn build(&self, assignments: &[String]) -> Result<Scene> {
         let build = |values: Vec<f64>| {
             let bodies = (self.bodies)(&values);
@@ -120,16 +120,16 @@ impl Entry {
         self.values(assignments).and_then(build).map_err(|e| e.within(self.name))
     }
 
-    /// Number of dynamic bodies of the scene that [`Entry::build`] makes.
+    /// Number of dynamic bodies in the scene that [`Entry::build`] makes.
     ///
     /// # Errors
-    /// As [`Entry::build`], except for values that contradict each other.
+    /// Those of [`Entry::build`], except for values that contradict each other.
     pub fn body_count(&self, assignments: &[String]) -> Result<u64> {
         let values = self.values(assignments).map_err(|e| e.within(self.name))?;
         Ok((self.bodies)(&values) as u64)
     }
 
-    /// One value for each parameter, in their order.
+    /// One value for each parameter, in order.
     pub(in crate::scenes) fn values(&self, assignments: &[String]) -> Result<Vec<f64>> {
         let mut values: Vec<f64> = self.parameters.iter().map(|p| p.default).collect();
         for assignment in assignments {
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::world::BodyKind;
 
-    /// Whether a scene has something that can move, or will have.
+    /// Whether a scene has, or spawns, a body that can move.
     fn moves(scene: &Scene) -> bool {
         scene.world.dynamic_count() > 0 || !scene.spawners.is_empty()
     }
@@ -186,7 +186,7 @@ mod tests {
     fn at_the_ends_of_its_ranges_a_scene_builds_or_is_refused() {
         for entry in CATALOGUE {
             for p in entry.parameters {
-                // The most bodies would take a while.
+                // The largest number of bodies would take a while.
                 let ends = if p.whole { vec![p.range.0] } else { vec![p.range.0, p.range.1] };
                 for end in ends {
                     match entry.build(&[format!("{}={end}", p.name)]) {
@@ -239,10 +239,10 @@ mod tests {
     #[test]
     fn no_range_allows_more_than_four_million_bodies() {
         for entry in CATALOGUE {
-            // The most towers are there with the smallest step.
+            // The smallest step gives the largest number of towers.
             let most = |p: &Parameter| if p.name == "step" { p.range.0 } else { p.range.1 };
             let most: Vec<f64> = entry.parameters.iter().map(most).collect();
-            // A scene may begin without bodies that move, and spawn them.
+            // A scene can start without moving bodies, and spawn them later.
             let least = if entry.name == "galton" { 0.0 } else { 1.0 };
             assert!((least..=MOST_BODIES).contains(&(entry.bodies)(&most)), "{}", entry.name);
         }

@@ -1,4 +1,4 @@
-//! Scenes of bodies that move far in a step.
+//! Scenes with bodies that move far in a step.
 
 use std::f64::consts::TAU;
 
@@ -10,14 +10,15 @@ use crate::random::SplitMix64;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
-/// Half of the side of the terrain (m), and its squares along each side.
+/// Half of the side of the terrain (m), and the number of squares along each side.
 const HALF: f32 = 10.0;
 const SQUARES: u32 = 20;
-/// Half of the side of the room of bullets (m), and of the thickness of its walls.
+/// Half of the side of the bullet room (m), and half of the thickness of its walls.
 const ROOM: f32 = 3.0;
 const SHEET: f32 = 0.0005;
 
-/// Hills of triangles with a high rim, under `n` thin slabs, coins and balls in turn that fall from `height` and above.
+/// Hills of triangles with a high rim. `n` bodies fall on them from `height` and above: thin slabs, coins and balls in
+/// turn.
 pub(super) fn terrain(n: usize, height: f32, seed: u64) -> Result<Scene> {
     let mut world = World::new();
     world.add(Body::fixed().named("terrain").shape(hills()?));
@@ -38,7 +39,7 @@ pub(super) fn terrain(n: usize, height: f32, seed: u64) -> Result<Scene> {
     Ok(Scene { container, ..Scene::new("terrain", world, 600) })
 }
 
-/// Waves both ways, 1 m high.
+/// Waves in both directions, 1 m high.
 fn hills() -> Result<Shape> {
     let side = SQUARES + 1;
     let at = |k: u32| 2.0 * HALF * (k as f32 / SQUARES as f32 - 0.5);
@@ -53,7 +54,7 @@ fn hills() -> Result<Shape> {
     Shape::mesh((0..side * side).map(vertex).collect(), triangles)
 }
 
-/// A room of six sheets of 1 mm, in which `n` balls of 2 cm, marked as swept, begin in a grid and fly at `speed` (m/s).
+/// A room of six sheets of 1 mm. `n` balls of 2 cm, marked as bullets, start in a grid and fly at `speed` (m/s).
 pub(super) fn bullets(n: usize, speed: f32, seed: u64) -> Scene {
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     for side in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {

@@ -1,4 +1,4 @@
-//! Scenes through which bodies flow: they come at one end and leave behind the other.
+//! Scenes with a flow of bodies: bodies appear at one end and leave beyond the other.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -12,12 +12,12 @@ use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
 use crate::world::{Body, Groups, Joint, Shape, World};
 
-/// Radius of the rollers of the conveyor (m), and the distance from one to the next.
+/// Radius of the rollers of the conveyor (m), and the distance between neighbors.
 const ROLLER: f32 = 0.15;
 const PITCH: f32 = 0.4;
 
-/// A conveyor of driven rollers, `length` long (m), whose tops move at `speed` (m/s). A box comes at one end every `every` steps, rides to the
-/// other end, falls off and leaves 1 m below.
+/// A conveyor of driven rollers, `length` long (m). The tops of the rollers move at `speed` (m/s). A box appears at one
+/// end every `every` steps, rides to the other end, falls off and leaves 1 m below.
 pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
     let mut world = World::new();
     let rollers = (length / PITCH).ceil() as usize + 1;
@@ -26,8 +26,9 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
         let roller = roller.position(PITCH * k as f32, -ROLLER, 0.0).rotation(about(Vec3::X, FRAC_PI_2));
         world.add(roller.velocity(Vec3::ZERO, Vec3::NEG_Z * (speed / ROLLER)));
     }
-    // As long as the distance of three rollers, so that two or more bear it. The bottom rises by 1 cm to both ends: a straight edge would hit each
-    // roller a little below its top, and the box would hop by 7 mm at 2 m/s. So it hops by 0.3 mm.
+    // A box is three roller distances long, so at least two rollers carry it. Its bottom rises by 1 cm towards both
+    // ends: a straight edge would hit each roller a little below its top, and the box would hop by 7 mm at 2 m/s. With
+    // the rise it hops by 0.3 mm.
     let mut points = Vec::new();
     for (x, z) in [(-1.0, -0.4), (-1.0, 0.4), (1.0, -0.4), (1.0, 0.4)] {
         for (half, y) in [(1.5 * PITCH, 0.2), (1.5 * PITCH, -0.19), (PITCH, -0.2)] {
@@ -43,14 +44,15 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
     Ok(scene)
 }
 
-/// A channel that slopes by 8 degrees, across which a cross of four arms turns freely about an upright axis: a hinge of two ball joints. One of `n`
-/// balls comes every `every` steps, rolls down, pushes an arm on, rolls off the end and leaves 3 m below.
+/// A channel that slopes by 8 degrees. A cross of four arms turns freely about an upright axis in it: a hinge of two
+/// ball joints. One of `n` balls appears every `every` steps, rolls down, pushes an arm, rolls off the end and leaves 3
+/// m below.
 pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     const WIDTH: f32 = 0.9;
     const BALL: f32 = 0.3;
     let slope = about(Vec3::Z, -8_f32.to_radians());
     let place = |x: f32, y: f32, z: f32| slope * Vec3::new(x, y, z);
-    // The cross passes through the walls, which meet balls alone.
+    // The cross passes through the walls, which collide only with balls.
     let (balls, walls, arms) = (0b001, 0b010, 0b100);
     let groups = |membership: u32, filter: u32| Groups { membership, filter };
     let mut world = World::new();
@@ -62,11 +64,11 @@ pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     for (name, z) in [("left", -0.5 * WIDTH - 0.05), ("right", 0.5 * WIDTH + 0.05)] {
         board(name, Vec3::new(8.0, 0.25, 0.05), place(-4.0, 0.15, z));
     }
-    // The axis stands in the right wall: arms cross the channel downhill, and go back behind the wall.
+    // The axis stands in the right wall: arms cross the channel downhill, and return behind the wall.
     let arm = Shape::cuboid(0.94 * WIDTH, 0.2, 0.03);
     let across = about(Vec3::Y, FRAC_PI_2);
     let cross = Body::dynamic().named("cross").shape(arm.clone()).shape_at(arm, Vec3::ZERO, across).total_mass(10.0);
-    // Smooth as ice: with more friction a ball and the wall can hold an arm between them for ever.
+    // As smooth as ice: with more friction a ball and the wall can jam an arm between them forever.
     let cross = cross.friction(0.02);
     let at = place(0.0, 0.35, 0.5 * WIDTH);
     let cross = world.add(cross.groups(groups(arms, balls)).position(at.x, at.y, at.z).rotation(slope));
@@ -81,17 +83,18 @@ pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     scene
 }
 
-/// An upright board: one of `n` balls comes every `every` steps at a random place near the middle, falls past `rows` rows of pins and into one of
-/// `rows + 1` bins. A sensor across the board sees every ball pass, and a sensor in each bin sees the balls that the bin gets.
+/// An upright board. One of `n` balls appears every `every` steps at a random place near the middle, falls past `rows`
+/// rows of pins and into one of `rows + 1` bins. A sensor across the board detects every ball, and a sensor in each bin
+/// detects the balls of that bin.
 pub(super) fn galton(n: u32, rows: usize, every: u32, seed: u64) -> Scene {
     const BALL: f32 = 0.1;
     const PIN: f32 = 0.06;
     const PITCH: f32 = 0.4;
-    // From a row of pins to the next, and from the glass to the back with a little room for a ball.
+    // From one row of pins to the next, and from the glass to the back, with a little room for a ball.
     const DROP: f32 = 0.4;
     const HALF_DEPTH: f32 = BALL + 0.01;
     let bins = rows + 1;
-    // No bin gets more than a third of the balls, and 15 balls take a meter of a bin.
+    // No bin gets more than a third of the balls, and 15 balls fill a meter of a bin.
     let rim = 0.6 + 0.03 * n as f32;
     let half_width = 0.5 * PITCH * bins as f32;
     let lowest = rim + 0.1;
@@ -112,8 +115,8 @@ pub(super) fn galton(n: u32, rows: usize, every: u32, seed: u64) -> Scene {
     for k in 0..rows {
         fixed("divider", [0.02, 0.5 * rim, HALF_DEPTH], [place(k, rows), 0.5 * rim, 0.0]);
     }
-    // The lowest row has a pin above each divider, and each row above has its pins over the gaps. The rows end a pitch off the walls, so that
-    // no ball is held between.
+    // The lowest row has a pin above each divider, and the pins of each row above are over the gaps of the row below.
+    // The rows end one pitch from the walls, so that no ball gets stuck there.
     let mut pins = Body::fixed().named("pins");
     let lying = about(Vec3::X, FRAC_PI_2);
     for row in 0..rows {

@@ -7,8 +7,8 @@ use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Joint, Shape, World};
 
-/// A ball at the end of `length` (m), lifted by `degrees` from where it would hang. Its radius is a tenth of the length,
-/// so that its period is 0.2 % longer than that of a point.
+/// A ball at the end of `length` (m), lifted by `degrees` from its hanging position. Its radius is a tenth of the
+/// length, so its period is 0.2 % longer than that of a point mass.
 pub(super) fn pendulum(length: f32, degrees: f32) -> Scene {
     let mut world = World::new();
     let turn = about(Vec3::Z, degrees.to_radians());
@@ -19,8 +19,8 @@ pub(super) fn pendulum(length: f32, degrees: f32) -> Scene {
     Scene::new("pendulum", world, 600)
 }
 
-/// `links` bars of 0.5 m, one end held, on the other a ball of `ratio` times the mass of a bar; straight, lifted by
-/// `degrees` from where it would hang.
+/// `links` bars of 0.5 m. One end is held, and the other carries a ball of `ratio` times the mass of a bar. The chain
+/// is straight, lifted by `degrees` from its hanging position.
 pub(super) fn chain(links: usize, ratio: f32, degrees: f32) -> Scene {
     const HALF: f32 = 0.25;
     const RADIUS: f32 = 0.2;
@@ -45,8 +45,8 @@ pub(super) fn chain(links: usize, ratio: f32, degrees: f32) -> Scene {
     Scene::new("chain", world, 600)
 }
 
-/// `planks` of 0.5 x 0.1 x 2 m between two fixed towers, two ball joints in each seam, hung in an arc of a circle, and
-/// `boxes` of 0.4 m on them. The container ends 0.5 m below the lowest seam: what falls off is outside.
+/// `planks` of 0.5 x 0.1 x 2 m between two fixed towers, with two ball joints in each seam, along an arc of a circle,
+/// and `boxes` of 0.4 m on them. The container ends 0.5 m below the lowest seam: a box that falls off is outside.
 pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     const PITCH: f32 = 0.5;
     const HALF: Vec3 = Vec3::new(0.24, 0.05, 1.0);
@@ -62,7 +62,7 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     let left = world.add(tower(seam.x - 0.5));
     let right = world.add(tower(0.5 - seam.x));
     let plank = Body::dynamic().shape(Shape::cuboid(HALF.x, HALF.y, HALF.z));
-    // Joins a body's right side, at this place in its frame, to the left side of the next plank.
+    // Joins the right side of a body, at this place in its frame, to the left side of the next plank.
     let join = |world: &mut World, body: usize, side: Vec3, next: usize, next_side: Vec3| {
         for z in [-0.8, 0.8].map(|z| z * Vec3::Z) {
             world.join(Joint::new(body, side + z, next, next_side + z));
@@ -82,7 +82,7 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     join(&mut world, before, side, right, Vec3::new(-0.5, 1.95, 0.0));
 
     for k in 0..boxes {
-        // In the middle of a plank, the boxes evenly spread.
+        // In the middle of a plank, with the boxes evenly spread.
         let on = right + 1 + (2 * k + 1) * planks / (2 * boxes);
         let Body { position, rotation, .. } = world.bodies[on];
         let Vec3 { x, y, z } = position + rotation * ((HALF.y + 0.2) * Vec3::Y);
@@ -93,8 +93,9 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     Scene { container, ..Scene::new("bridge", world, 600) }
 }
 
-/// `n` x `n` balls, each tied to its neighbors halfway between them, a plane sheet whose first row is tied to the world:
-/// it swings down from the horizontal. The ball in the middle of the last row has `ratio` times the mass of the others.
+/// A plane sheet of `n` x `n` balls. Joints tie each ball to its neighbors, halfway between them, and the first row to
+/// the world: the sheet swings down from the horizontal. The ball in the middle of the last row has `ratio` times the
+/// mass of the others.
 pub(super) fn grid(n: usize, ratio: f32) -> Scene {
     const PITCH: f32 = 0.5;
     let mut world = World::new();

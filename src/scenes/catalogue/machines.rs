@@ -9,15 +9,15 @@ use crate::math::rotation::{about, arc, product};
 use crate::scenes::scene::Scene;
 use crate::world::{Axis, Body, Bounds, Drive, Joint, Linear, MassProperties, Shape, World};
 
-/// A crank, a coupler and a rocker in the plane z = 0, hinged to each other and to two points of the world 0.5 m apart. A motor turns the
-/// crank at `speed` (rad/s).
+/// A crank, a coupler and a rocker in the plane z = 0. Hinges join them to each other and to two points of the world
+/// 0.5 m apart. A motor turns the crank at `speed` (rad/s).
 pub(super) fn four_bar(speed: f32) -> Scene {
     const GROUND: f32 = 0.5;
     const CRANK: f32 = 0.2;
     const COUPLER: f32 = 0.5;
     const ROCKER: f32 = 0.4;
     let mut world = World::new();
-    // The crank begins upright; the rocker ends where the coupler reaches it.
+    // The crank starts upright. The rocker ends where the coupler reaches it.
     let (left, right) = (Vec3::ZERO, GROUND * Vec3::X);
     let top = CRANK * Vec3::Y;
     let across = right - top;
@@ -40,13 +40,13 @@ pub(super) fn four_bar(speed: f32) -> Scene {
     Scene::new("four-bar", world, 600)
 }
 
-/// A deck of 4 m, hinged to a tower; two winches pull its far end up by ropes, with a crate of `load` kg on it.
+/// A deck of 4 m, hinged to a tower, with a crate of `load` kg on it. Two winches pull its far end up by ropes.
 pub(super) fn drawbridge(load: f32) -> Scene {
     const LENGTH: f32 = 4.0;
     const WIDTH: f32 = 1.0;
-    /// Of the deck (rad). Friction of 1 holds the crate there.
+    /// Largest angle of the deck (rad). A friction of 1 holds the crate there.
     const STEEPEST: f32 = 0.6;
-    /// The speed of the ropes (m/s), and the most that each bears (N).
+    /// The speed of the ropes (m/s), and the largest force of each (N).
     const WINCH: (f32, f32) = (-0.4, 2e4);
     let mut world = World::new();
     let tower = Body::fixed().named("tower").shape(Shape::cuboid(0.5, 3.0, 1.5)).position(-0.6, 1.0, 0.0);
@@ -69,13 +69,13 @@ pub(super) fn drawbridge(load: f32) -> Scene {
     Scene::new("drawbridge", world, 600)
 }
 
-/// A chassis of 1200 kg on four sprung wheels. Motors turn the rear wheels so that it drives along x at `speed` (m/s), over bumps.
-/// `inside`: how far the wheels reach into the chassis (m), where they do.
+/// A chassis of 1200 kg on four sprung wheels. Motors turn the rear wheels so that it drives along x at `speed` (m/s),
+/// over bumps. `inside` is the depth of the wheels in the chassis, if they overlap it (m).
 pub(super) fn car(speed: f32, inside: f32) -> Scene {
     const RADIUS: f32 = 0.35;
     const CHASSIS: f32 = 1200.0;
     const WHEEL: f32 = 30.0;
-    /// How often a second the chassis swings on its springs (Hz), and their damping ratio.
+    /// Frequency of the chassis on its springs (Hz), and their damping ratio.
     const RIDE: (f32, f32) = (1.5, 0.4);
     let mut world = floor(200.0, 10.0);
     world.bodies[0].material.friction = 1.0;
@@ -93,7 +93,7 @@ pub(super) fn car(speed: f32, inside: f32) -> Scene {
         let turned = about(Vec3::X, FRAC_PI_2);
         let wheel = Body::dynamic().named("wheel").shape(Shape::cylinder(0.12, RADIUS)).total_mass(WHEEL).friction(1.0);
         let wheel = world.add(wheel.rotation(turned).position(x, RADIUS, z));
-        // A spring is given by the frequency of what it moves, and that is first of all the wheel.
+        // A spring is set by the frequency of the mass that it moves, and that is mainly the wheel.
         let arm = Vec3::new(x, 0.0, z);
         let corner = 1.0 / CHASSIS + {
             let chassis = &world.bodies[chassis];
@@ -108,7 +108,7 @@ pub(super) fn car(speed: f32, inside: f32) -> Scene {
         let place = Vec3::new(x, RADIUS - 0.75, z);
         let joint = |body: usize| Joint::new(body, Vec3::ZERO, chassis, place).along(Vec3::Z);
         if inside > 0.0 {
-            // On an axle of its own, so that the wheel collides with the chassis.
+            // The wheel has its own axle, so it collides with the chassis.
             let mass = 0.5 * WHEEL;
             let axle =
                 MassProperties { mass, principal_inertia: Vec3::splat(0.02 * mass), ..MassProperties::IMMOVABLE };
@@ -124,10 +124,11 @@ pub(super) fn car(speed: f32, inside: f32) -> Scene {
     Scene::new("car", world, 600)
 }
 
-/// A body of a ragdoll: name, middle, half of its length along y, radius; the number of the part that holds it, and the place where.
+/// A part of a ragdoll: name, center, half of its length along y, radius; the index of the part that holds it, and the
+/// place of the joint.
 type Part = (&'static str, [f32; 3], f32, f32, Option<(usize, [f32; 3])>);
 
-/// A trunk of two, a head, arms and legs. The left hand is at +z.
+/// A trunk of two parts, a head, arms and legs. The left hand is at +z.
 const PARTS: [Part; 11] = [
     ("hips", [0.0, 1.0, 0.0], 0.06, 0.13, None),
     ("chest", [0.0, 1.35, 0.0], 0.1, 0.14, Some((0, [0.0, 1.15, 0.0]))),
@@ -142,7 +143,8 @@ const PARTS: [Part; 11] = [
     ("right shin", [0.0, 0.25, -0.1], 0.15, 0.05, Some((9, [0.0, 0.46, -0.1]))),
 ];
 
-/// The axes of what holds a part: turns about z, along the limb, and sideways. A motor at rest is the friction of the joint.
+/// The axes of the joint that holds a part: rotations about z, along the limb, and sideways. A motor with zero speed
+/// acts as friction of the joint.
 fn limb(name: &str) -> [Axis; 3] {
     let loose = |axis: Axis, torque: f32| axis.motor(0.0, torque);
     let bend = |min: f32, max: f32| [loose(Axis::limited(min, max), 2.0), Axis::LOCKED, Axis::LOCKED];
@@ -161,12 +163,12 @@ fn limb(name: &str) -> [Axis; 3] {
     }
 }
 
-/// `n` ragdolls side by side at the head of stairs of 12 steps along x, pushed forwards.
+/// `n` ragdolls side by side at the top of 12 stairs along x, pushed forwards.
 pub(super) fn ragdoll(n: usize) -> Scene {
     const STEPS: usize = 12;
     const TREAD: f32 = 0.3;
     const RISE: f32 = 0.18;
-    // Room beside them: one that turns as it falls does not leave the stairs.
+    // Leave room beside them: a ragdoll that turns as it falls must not leave the stairs.
     let half_width = 0.8 * n as f32 + 1.2;
     let mut world = floor(12.0, half_width);
     let height = RISE * STEPS as f32;
@@ -179,14 +181,15 @@ pub(super) fn ragdoll(n: usize) -> Scene {
     }
     for i in 0..n {
         let feet = Vec3::new(-0.3, height + 0.01, 1.6 * (i as f32 - 0.5 * (n as f32 - 1.0)));
-        // Pushed at the chest.
+        // The push acts at the chest.
         let forwards = |y: f32| Vec3::X * (1.5 * y.max(height) - 1.5 * height);
         add_ragdoll(&mut world, |part| feet + part, Quat::IDENTITY, forwards, limb);
     }
     Scene::new("ragdoll", world, 600)
 }
 
-/// A ragdoll whose parts are turned, and where `place` has them; `velocity` by the height of a part. `axes` are those of what holds a part.
+/// A ragdoll with rotated parts at positions from `place`. `velocity` is a function of the height of a part, and `axes`
+/// returns the axes of the joint that holds a part.
 fn add_ragdoll(
     world: &mut World,
     place: impl Fn(Vec3) -> Vec3,
@@ -208,7 +211,8 @@ fn add_ragdoll(
     }
 }
 
-/// `n` ragdolls, each turned another way, in rows of five over a floor. All their axes have friction: a leg on the floor would roll to and fro for ever.
+/// `n` ragdolls, each rotated differently, in rows of five over a floor. All their axes have friction: a leg on the
+/// floor would roll to and fro forever.
 pub(super) fn ragdolls(n: usize) -> Scene {
     let axes = |name: &str| {
         let is_loose = |axis: &Axis| axis.bounds != Bounds::Locked && axis.drive == Drive::None;
@@ -224,7 +228,7 @@ pub(super) fn ragdolls(n: usize) -> Scene {
     Scene::new("ragdolls", world, 600)
 }
 
-/// A crate of 1 m on the floor, and a press that stands `depth` deep in it (m).
+/// A crate of 1 m on the floor, and a press that overlaps it by `depth` (m).
 pub(super) fn press(depth: f32) -> Scene {
     let mut world = floor(5.0, 5.0);
     let block = |body: Body| body.shape(Shape::cuboid(0.5, 0.5, 0.5));

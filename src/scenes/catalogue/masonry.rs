@@ -1,4 +1,5 @@
-//! What stands without mortar, or falls in turn: arch, aqueduct, house of cards, planks, dominoes, pyramid under a heavy box.
+//! Structures without mortar that stand, or fall in turn: arch, aqueduct, house of cards, planks, dominoes, and a
+//! pyramid under a heavy box.
 
 use std::f64::consts::PI;
 
@@ -10,12 +11,12 @@ use crate::math::rotation::about;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
-/// Distance between neighboring stones at the start (m): of hulls that touch exactly, nothing says which way they touch.
+/// Initial distance between neighboring stones (m). Hulls that touch exactly have no defined contact direction.
 const GAP: f64 = 1e-4;
 /// Friction of stones.
 const STONE: f32 = 0.6;
 
-/// Wedges that make a semicircle about the z axis.
+/// Wedges that form a semicircle about the z axis.
 struct Ring {
     /// Mean radius (m).
     radius: f64,
@@ -37,19 +38,19 @@ impl Ring {
         self.radius * (1.0 + self.thickness / 2.0)
     }
 
-    /// Top of the middle wedge over the center, if their number is odd (m).
+    /// Height of the top of the middle wedge above the center, if their number is odd (m).
     fn crown(&self) -> f64 {
         self.outer() * libm::cos(self.half()) + GAP / 2.0
     }
 
-    /// Adds the wedges, the springing at height `y` around `x`.
+    /// Adds the wedges, with the springing at height `y` around `x`.
     fn add_to(&self, world: &mut World, x: f64, y: f64) -> Result<()> {
         let (inner, outer) = (2.0 * self.radius - self.outer(), self.outer());
-        // In the frame of a wedge x points out of the arch and y along it.
+        // In the frame of a wedge, x points out of the arch and y along it.
         let corner = |r: f64, angle: f64, z: f32| {
             Vec3::new((r * libm::cos(angle) - self.radius) as f32, (r * libm::sin(angle)) as f32, z * self.depth)
         };
-        // Both faces of a wedge are half of the gap further in.
+        // Both faces of a wedge are moved in by half of the gap.
         let slit = |r: f64| self.half() - GAP / 2.0 / r;
         let sides = [(inner, -slit(inner)), (inner, slit(inner)), (outer, -slit(outer)), (outer, slit(outer))];
         let corners: Vec<Vec3> = sides.iter().flat_map(|&(r, a)| [-0.5, 0.5].map(|z| corner(r, a, z))).collect();
@@ -64,13 +65,13 @@ impl Ring {
     }
 }
 
-/// A semicircular arch of mean radius 5 m: `voussoirs` wedges, `thickness` of the radius thick and 1 m deep, on two fixed
-/// springers, mu 0.6. Statics ask for a thickness of at least 0.1075 (Milankovitch, 1907) where nothing slides.
+/// A semicircular arch of mean radius 5 m on two fixed springers: `voussoirs` wedges, `thickness` of the radius thick
+/// and 1 m deep, mu 0.6. If nothing slides, statics requires a thickness of at least 0.1075 (Milankovitch, 1907).
 pub(super) fn arch(voussoirs: usize, thickness: f64) -> Result<Scene> {
     arch_of(voussoirs, thickness, STONE)
 }
 
-/// The same with any friction of all stones.
+/// The same with any friction.
 pub(super) fn arch_of(voussoirs: usize, thickness: f64, friction: f32) -> Result<Scene> {
     let ring = Ring { radius: 5.0, thickness, depth: 1.0, voussoirs, friction };
     let mut world = floor(20.0, 10.0);
@@ -82,13 +83,13 @@ pub(super) fn arch_of(voussoirs: usize, thickness: f64, friction: f32) -> Result
     Ok(Scene::new("arch", world, 600).standing())
 }
 
-/// `arches` semicircles of mean radius 2 m side by side on piers of three loose blocks, 11 wedges each; slabs lie from crown to
-/// crown. Neighbors push against each other over their pier; the outermost piers are fixed.
+/// `arches` semicircles of mean radius 2 m side by side on piers of three loose blocks, 11 wedges each. Slabs lie from
+/// crown to crown. Neighbors push against each other over their pier. The outermost piers are fixed.
 pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
     const BLOCK: f64 = 1.0;
     const BLOCKS: usize = 3;
     let ring = Ring { radius: 2.0, thickness: 0.25, depth: 1.0, voussoirs: 11, friction: STONE };
-    // Between neighbors over a pier is half a gap to each side.
+    // Between neighbors over a pier there is half a gap on each side.
     let pitch = 2.0 * ring.outer() + GAP;
     let pier_half = ring.outer() - ring.radius + ring.thickness * ring.radius / 2.0;
     let springing = BLOCKS as f64 * (BLOCK + GAP) + GAP;
@@ -99,7 +100,7 @@ pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
         let block =
             |body: Body, half_y: f64| body.shape(Shape::cuboid(pier_half as f32, half_y as f32, 0.5)).friction(STONE);
         if pier == 0 || pier == arches {
-            // Tall enough to hold the outermost arch's foot.
+            // Tall enough to hold the foot of the outermost arch.
             let half = springing / 2.0;
             world.add(block(Body::fixed().named("abutment"), half).position(x as f32, half as f32, 0.0));
             continue;
@@ -125,13 +126,14 @@ pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
     Ok(Scene::new("aqueduct", world, 600).standing())
 }
 
-/// A tower of planks of 0.08 x 0.24 x 1.2 m: in each of its `storeys` nine stand on end in a square, three lie across them
-/// one way and three the other.
+/// A tower of planks of 0.08 x 0.24 x 1.2 m. In each of its `storeys`, nine planks stand on end in a square, three lie
+/// across them one way, and three the other way.
 pub(super) fn kapla(storeys: usize) -> Scene {
     planks("kapla", storeys, Vec3::new(0.04, 0.12, 0.6), 0.55)
 }
 
-/// The same of planks with any half extents, the thinnest first, and any `pitch` of those on end (m): a plank that lies reaches over three.
+/// The same with planks of any half extents, the smallest first, and with any `pitch` of the planks on end (m). A plank
+/// across reaches over three of them.
 pub(super) fn planks(name: &str, storeys: usize, half: Vec3, pitch: f64) -> Scene {
     let storey_height = 2.0 * f64::from(half.z) + 4.0 * f64::from(half.x);
     let mut world = floor(20.0, 20.0);
@@ -143,7 +145,7 @@ pub(super) fn planks(name: &str, storeys: usize, half: Vec3, pitch: f64) -> Scen
         let lying = 2.0 * f64::from(half.z) + f64::from(half.x);
         for i in 0..3 {
             for j in 0..3 {
-                // Every other one turned.
+                // Rotate every other one.
                 let (x, z) = if (i + j) % 2 == 0 { (half.x, half.y) } else { (half.y, half.x) };
                 put(Vec3::new(x, half.z, z), at(i), f64::from(half.z), at(j));
             }
@@ -158,15 +160,16 @@ pub(super) fn planks(name: &str, storeys: usize, half: Vec3, pitch: f64) -> Scen
     Scene::new(name, world, 3600).standing()
 }
 
-/// A house of `storeys` of cards, `length` (m) long, 0.8 of it wide and `thickness` (m) thick: pairs that lean at each other by
-/// `degrees` from the vertical, one pair fewer in each storey, and a plate across the pairs of each storey but the last.
+/// A house of cards with `storeys` storeys. Cards are `length` (m) long, 0.8 of it wide and `thickness` (m) thick.
+/// Pairs lean against each other at `degrees` from the vertical. Each storey has one pair fewer, and a plate lies
+/// across the pairs of each storey except the last.
 pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thickness: f64) -> Scene {
     let half_width = 0.4 * length as f32;
     let (sin, cos) = libm::sincos(degrees.to_radians());
-    // From a pair's ridge to the middle of its cards, to the side; from its feet to its highest edges.
+    // Sideways distance from a pair's ridge to the middle of its cards, and height from its feet to its highest edges.
     let aside = (thickness * cos + length * sin) / 2.0;
     let rise = thickness * sin + length * cos;
-    // Feet of neighbors come half of a thickness near.
+    // The feet of neighbors are half a thickness apart.
     let pitch = 2.0 * (length * sin + thickness * cos) + 0.5 * thickness;
     let cuboid = |x: f64, y: f64| Body::dynamic().shape(Shape::cuboid(x as f32, y as f32, half_width)).friction(mu);
     let card = cuboid(thickness / 2.0, length / 2.0);
@@ -191,12 +194,12 @@ pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thi
     Scene::new("card-house", world, 600).standing()
 }
 
-/// `n` dominoes of 0.15 x 1 x 0.5 m, 0.45 m apart; the first one tips over its far edge with 1.5 rad/s.
+/// `n` dominoes of 0.15 x 1 x 0.5 m, 0.45 m apart. The first one tips over its far edge at 1.5 rad/s.
 pub(super) fn dominoes(n: usize) -> Scene {
     domino_row("dominoes", n, Vec3::new(0.075, 0.5, 0.25), 0.45, 1.5)
 }
 
-/// The same of dominoes with any half extents and `pitch` (m), the first one tipping with `push` (rad/s).
+/// The same with dominoes of any half extents and `pitch` (m). The first one tips at `push` (rad/s).
 pub(super) fn domino_row(name: &str, n: usize, half: Vec3, pitch: f64, push: f32) -> Scene {
     let mut world = floor((n as f64 * pitch / 2.0) as f32 + 10.0, 10.0);
     let domino = Body::dynamic().shape(Shape::cuboid(half.x, half.y, half.z));
@@ -210,7 +213,7 @@ pub(super) fn domino_row(name: &str, n: usize, half: Vec3, pitch: f64, push: f32
     Scene::new(name, world, steps)
 }
 
-/// A plane pyramid of cubes with 0.1 m between neighbors, and on its tip one more, `ratio` times as dense.
+/// A plane pyramid of cubes with 0.1 m between neighbors, and one more cube on its tip, `ratio` times as dense.
 pub(super) fn pyramid_heavy(base: usize, ratio: f32) -> Scene {
     let mut scene = super::boxes::pyramid(base, 0.0);
     scene.name = "pyramid-heavy".to_owned();

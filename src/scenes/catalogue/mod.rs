@@ -1,4 +1,4 @@
-//! The catalogue: every scene that comes with the crate, by name and parameters.
+//! The catalogue of built-in scenes, by name and parameters.
 
 mod basics;
 mod boxes;
@@ -34,12 +34,12 @@ fn triangle(n: f64) -> f64 {
     n * (n + 1.0) / 2.0
 }
 
-/// Refuses a parameter that is larger than another one.
+/// Refuses a parameter that is larger than its limit, which is another parameter.
 fn at_most([name, limit]: [&str; 2], value: f64, most: f64) -> Result<()> {
     ensure(value <= most, || format!("{name} = {value}: must be at most {limit} = {most}"))
 }
 
-/// Every scene that comes with the crate.
+/// Every built-in scene.
 pub static CATALOGUE: &[Entry] = &[
     Entry {
         name: "pile",
@@ -426,7 +426,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::word("kind", &Family::NAMES, "family of worlds"),
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of all that is drawn"),
         ],
-        // The draw alone says how many there are: at most a few hundred.
+        // Only drawing the world tells the number: at most a few hundred.
         bodies: |v| families::drawn(v[0] as usize, v[1] as u64).map_or(0.0, |scene| scene.world.dynamic_count() as f64),
         build: |v| families::drawn(v[0] as usize, v[1] as u64),
     },

@@ -1,11 +1,12 @@
-//! Stacks of cubes: straight, shifted, many next to each other, light under heavy.
+//! Stacks of cubes: straight, shifted, many side by side, and light cubes under heavy ones.
 
 use super::common::{centered, floor, lifted, unit_box};
 use crate::random::SplitMix64;
 use crate::scenes::scene::{Group, Scene};
 use crate::world::{Body, Shape, World};
 
-/// Adds `n` cubes on top of each other, with gaps as in [`lifted`]; `cube(k)` gives the k-th one's place along x and z (m) and its density (kg/m³).
+/// Adds `n` cubes on top of each other, with gaps as in [`lifted`]. `cube(k)` returns the position of the k-th cube
+/// along x and z (m) and its density (kg/m³).
 pub(super) fn stack(world: &mut World, n: usize, gap: f32, mut cube: impl FnMut(usize) -> ([f32; 2], f32)) {
     for k in 0..n {
         let ([x, z], density) = cube(k);
@@ -13,14 +14,14 @@ pub(super) fn stack(world: &mut World, n: usize, gap: f32, mut cube: impl FnMut(
     }
 }
 
-/// One such stack on a floor, as a scene that stands.
+/// One such stack on a floor, as a scene that should stand.
 fn standing(name: &str, n: usize, gap: f32, cube: impl FnMut(usize) -> ([f32; 2], f32)) -> Scene {
     let mut world = floor(20.0, 20.0);
     stack(&mut world, n, gap, cube);
     Scene::new(name, world, 600).standing()
 }
 
-/// `offset` one way and the other in turn.
+/// `offset` with alternating sign.
 fn in_turn(k: usize, offset: f32) -> f32 {
     if k.is_multiple_of(2) { offset } else { -offset }
 }
@@ -41,25 +42,26 @@ pub(super) fn coins(n: usize) -> Scene {
     Scene::new("coins", world, 600).standing()
 }
 
-/// A stack of `n` cubes, shifted by `offset` one way and the other in turn; the top one has `top_ratio` times the density.
+/// A stack of `n` cubes, shifted by `offset` to alternating sides. The top cube has `top_ratio` times the density.
 pub(super) fn tower(n: usize, offset: f32, top_ratio: f32, gap: f32) -> Scene {
     standing("tower", n, gap, |k| ([in_turn(k, offset), 0.0], if k + 1 == n { 1000.0 * top_ratio } else { 1000.0 }))
 }
 
-/// A stack of `n` cubes, each off the axis by up to `offset` along x and along z: SplitMix64 with seed 1, x first.
+/// A stack of `n` cubes, each off the axis by up to `offset` along x and along z. The shifts come from SplitMix64 with
+/// seed 1, x first.
 pub(super) fn misaligned(n: usize, offset: f64) -> Scene {
     let mut random = SplitMix64::new(1);
     let mut shift = || (offset * random.symmetric()) as f32;
     standing("misaligned", n, 0.0, |_| ([shift(), shift()], 1000.0))
 }
 
-/// A stack of `n` cubes, the lowest of 1000 kg/m³, every other one `ratio` times as dense.
+/// A stack of `n` cubes: the lowest has 1000 kg/m³, and every other one is `ratio` times as dense.
 pub(super) fn mass_ratio(n: usize, ratio: f32, gap: f32) -> Scene {
     standing("mass-ratio", n, gap, |k| ([0.0; 2], if k % 2 == 0 { 1000.0 } else { 1000.0 * ratio }))
 }
 
-/// Towers of `step`, 2 `step`, ... up to `n` cubes, 4 m apart along z, each a group; cubes 0.01 m off to the one side and
-/// to the other in turn, along x, so that a tower that falls misses its neighbors.
+/// Towers of `step`, 2 `step`, ... up to `n` cubes, 4 m apart along z. Each tower is a group. Cubes are 0.01 m off to
+/// alternating sides along x, so a falling tower misses its neighbors.
 pub(super) fn tallest(n: usize, step: usize) -> Scene {
     const PITCH: f64 = 4.0;
     let count = n / step;

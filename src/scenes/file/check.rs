@@ -1,4 +1,4 @@
-//! From a scene file to a scene. The world checks ranges; this file checks the rest.
+//! Converts a scene file to a scene. The world checks ranges, and this module checks the rest.
 
 use std::fmt::Display;
 
@@ -13,7 +13,7 @@ use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
 use crate::world::{Body, BodyKind, MassProperties, Shape, World};
 
-/// The scene that a file describes, named `name` if the file gives it none.
+/// The scene that a file describes. Its name is `name` if the file has none.
 pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
     if file.version != 1 {
         return Err(unknown_version(file.version));
@@ -51,7 +51,7 @@ pub(super) fn unknown_version(version: impl Display) -> Error {
     input!("version = {version}: only version 1 is known")
 }
 
-/// What a message calls a body: its index and, if it has one, its name.
+/// The name of a body in messages: its index and, if it has one, its name.
 pub(super) fn body_label(index: usize, name: Option<&str>) -> String {
     name.map_or_else(|| format!("body {index}"), |name| format!("body {index} {name:?}"))
 }
@@ -108,7 +108,7 @@ fn leaves(file: &LeavesFile) -> Result<Leaves> {
     Ok(Leaves { below, after })
 }
 
-/// The body with the mass that the file gives it.
+/// The body with its mass from the file.
 fn with_mass(mut body: Body, file: &BodyFile) -> Result<Body> {
     let dynamic = file.kind == BodyKind::Dynamic;
     match (file.density, file.mass, &file.mass_properties) {
@@ -147,7 +147,7 @@ fn mass_properties(file: &MassFile) -> Result<MassProperties> {
     })
 }
 
-/// The shape, its position and its rotation, all checked before the body computes a mass from them.
+/// The shape, its position and its rotation. All are checked before the body computes a mass from them.
 fn shape(file: &ShapeFile) -> Result<(Shape, Vec3, Quat)> {
     let extent = |name: &str, x: f64| finite(name, [x]).map(|[x]| x);
     let round = |of: fn(f32, f32) -> Shape, half_height: f64, radius: f64| -> Result<Shape> {

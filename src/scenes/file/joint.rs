@@ -1,4 +1,4 @@
-//! From a joint of a scene file to a joint of the world.
+//! Converts a joint of a scene file to a joint of the world.
 
 use std::fmt;
 
@@ -50,7 +50,7 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
     };
     ensure(b != Some(a), || format!("bodies {} and {}: the same body twice", bodies[0], bodies[1]))?;
     let dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
-    let message = "nothing that it ties can be moved: one of the bodies must be dynamic";
+    let message = "no body of the joint can move: at least one must be dynamic";
     ensure(dynamic(a) || b.is_some_and(dynamic), || message.into())?;
     let (anchor_a, anchor_b) = match (anchor, anchors) {
         (Some(point), None) => {
@@ -72,7 +72,7 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
         break_force,
         ..Joint::to_world(handle(a), anchor_a, anchor_b)
     };
-    // Frames that agree as the bodies stand.
+    // Choose frames that agree at the present rotations of the bodies.
     let in_world = |frame: Quat| {
         let on = |body: usize| turn::unit(turn::product(world.bodies[body].rotation.inverse(), frame));
         Joint { frame_a: on(a), frame_b: b.map_or(frame, on), ..joint }
@@ -128,7 +128,7 @@ fn read_axis(
     let bounds = match limits {
         Some(_) if locked => return Err(input!("{name}locked and {name}limits: give one of them")),
         Some(limits) => {
-            // An absent limit is infinite, and no number of a file is.
+            // An absent limit is infinite, and numbers in a file are finite.
             let given = limits.map(|limit| if limit.is_infinite() { 0.0 } else { limit });
             let given = finite(format!("{name}limits"), given)?;
             let [min, max] = [0, 1].map(|i| if limits[i].is_infinite() { limits[i] as f32 } else { given[i] });

@@ -24,23 +24,25 @@ impl SceneFile {
     /// Reads the text of a scene file.
     ///
     /// # Errors
-    /// Not JSON, another version, an unknown or missing key, a value of the wrong type: one line that says where.
+    /// The text is not JSON, has another version, has an unknown or missing key, or a value has the wrong type. One
+    /// line names the place.
     pub fn parse(text: &str) -> Result<Self> {
         let mut json = serde_json::Deserializer::from_str(text);
         let parsed = serde_path_to_error::deserialize(&mut json).map_err(|e| explain(text, &e));
         parsed.and_then(|file| json.end().map(|()| file).map_err(Error::input))
     }
 
-    /// Checks every value and builds the scene, which takes `name` if the file gives it none.
+    /// Checks every value and builds the scene. Its name is `name` if the file has none.
     ///
     /// # Errors
-    /// A value that no scene can be made of: one line with the body, the value and what it must be.
+    /// No scene can be built from a value. One line names the body, the value and the valid range.
     pub fn into_scene(self, name: &str) -> Result<Scene> {
         check::scene(self, name)
     }
 
-    /// The file of a scene, every number to the last bit, for bodies at rest or in motion. Whether the scene stands and its groups of bodies are
-    /// not in it, nor forces of the next step alone and the impulses of contacts.
+    /// Converts a scene to a file, with every number to the last bit, for bodies at rest or in motion. The file does
+    /// not contain [`Scene::stands`], [`Scene::groups`], the forces of the next step alone, or the impulses of
+    /// contacts.
     ///
     /// ```
     /// use drystone::{Scene, scenes::SceneFile};
@@ -52,7 +54,8 @@ impl SceneFile {
     /// ```
     ///
     /// # Errors
-    /// There are several worlds, or a body with numbers that are not finite or that no scene file may have: one line that names it.
+    /// There are several worlds, or a body has numbers that are not finite or that a scene file cannot represent. One
+    /// line names the body.
     pub fn of(scene: &Scene) -> Result<Self> {
         let file = write::file(scene)?;
         file.clone().into_scene(&scene.name).map(|_| file)
@@ -61,7 +64,7 @@ impl SceneFile {
     /// The text of the file, as JSON.
     pub fn to_text(&self) -> String {
         let mut text = serde_json::to_string(self).unwrap_or_default();
-        // A body a line.
+        // One body on each line.
         for list in ["\"bodies\":[", "\"joints\":[", "\"spawners\":["] {
             text = text.replacen(list, &format!("\n{list}\n"), 1);
         }
@@ -81,7 +84,7 @@ impl SceneFile {
 /// ```
 ///
 /// # Errors
-/// The file cannot be read, or says something that no scene can be made of: one line that names the file and the place.
+/// The file cannot be read, or no scene can be built from it. One line names the file and the place.
 pub fn load(path: &Path) -> Result<Scene> {
     let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -97,9 +100,9 @@ pub fn schema() -> Value {
     schemars::schema_for!(SceneFile).to_value()
 }
 
-/// One line for what serde found: where it is, with the body's name, and what.
+/// Formats an error of serde as one line: the place, the name of the body, and the message.
 fn explain(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> Error {
-    // Only now is the text worth a second look; malformed text has no more to say.
+    // Parse the text again only after an error. Malformed text gives no more information.
     let value: Value = serde_json::from_str(text).unwrap_or_default();
     if let Some(version) = value.get("version").filter(|&v| *v != 1) {
         return check::unknown_version(version);

@@ -1,4 +1,4 @@
-//! Numbers of a scene file in single precision; every refusal is one line.
+//! Converts numbers of a scene file to single precision. Every refusal is one line.
 
 use std::fmt::Display;
 
@@ -7,13 +7,13 @@ use glam::Quat;
 use crate::error::{Error, Result, input};
 use crate::world::MOST_LENGTH;
 
-/// How far a quaternion or a normal may be from length 1; nearer ones are normalized.
+/// Tolerance for the length of a quaternion or a normal. Within it, the value is normalized.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// How far rounding to single precision takes a quaternion from length 1.
+/// Largest error of the length of a quaternion by rounding to single precision.
 const ROUNDING: f64 = 3.0 * f32::EPSILON as f64;
 
-/// The values in single precision if each of them `fits`; else a line that says what the values `must` be.
+/// The values in single precision if each of them `fits`; else an error that says what the values `must` be.
 pub(super) fn checked<const N: usize>(
     name: impl Display,
     values: [f64; N],
@@ -27,7 +27,7 @@ pub(super) fn checked<const N: usize>(
     if rounded.iter().all(|&x| fits(x)) { Ok(rounded) } else { Err(refusal(name, &values, must)) }
 }
 
-/// Numbers whose range the world checks.
+/// Converts numbers whose range the world checks.
 pub(super) fn finite<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32; N]> {
     checked(name, values, "", |_| true)
 }
@@ -52,7 +52,7 @@ pub(super) fn rotation(name: &str, values: [f64; 4]) -> Result<Quat> {
 /// A direction or a quaternion, normalized.
 pub(super) fn unit<const N: usize>(name: &str, values: [f64; N]) -> Result<[f32; N]> {
     let length = values.iter().map(|x| x * x).sum::<f64>().sqrt();
-    // What was normalized in single precision is read as it was written.
+    // A value that was normalized in single precision is read unchanged.
     if (length - 1.0).abs() <= ROUNDING {
         return Ok(values.map(|x| x as f32));
     }
@@ -63,7 +63,7 @@ pub(super) fn unit<const N: usize>(name: &str, values: [f64; N]) -> Result<[f32;
     }
 }
 
-/// One line: what a value is called, what it is, and what it must be.
+/// One line: the name of a value, the value, and the requirement.
 pub(super) fn refusal(name: impl Display, values: &[f64], must: &str) -> Error {
     input!("{name} = {}: must be {must}", shown(values))
 }

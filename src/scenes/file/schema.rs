@@ -5,10 +5,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::world::{BodyKind, Groups};
 
-/// The content of a scene file, of which only the form is checked: version 1 of the format.
+/// The content of a scene file, version 1. Parsing checks only its form.
 ///
-/// SI units, right-handed. Numbers are stored in single precision; lengths may be up to 1e9 m. A key that is left out takes
-/// its default; a key that is not listed is refused.
+/// Units are SI, and the axes are right-handed. Numbers are stored in single precision; lengths can be up to 1e9 m. A
+/// missing key takes its default. An unknown key is refused.
 ///
 /// ```
 /// let text = r#"{"version": 1, "bodies": [{"shapes": [{"type": "ball", "radius": 0.5}]}]}"#;
@@ -54,7 +54,7 @@ pub struct SceneFile {
     /// Version of the format: 1.
     #[schemars(extend("const" = 1))]
     pub version: u32,
-    /// Name of the scene; the file's name without its extension if left out.
+    /// Name of the scene; by default the file name without its extension.
     pub name: Option<String>,
     /// Acceleration of every dynamic body (m/s²), up to 1e9 along each axis.
     #[serde(default = "defaults::gravity")]
@@ -62,7 +62,7 @@ pub struct SceneFile {
     /// Length of a step (s), 1e-9 to 1.
     #[serde(default = "defaults::dt")]
     pub dt: f64,
-    /// Steps of a run that asks for none.
+    /// Default number of steps of a run.
     #[serde(default = "defaults::steps")]
     pub steps: u32,
     /// Lower and upper corner of the space that no dynamic body should leave (m).
@@ -73,38 +73,38 @@ pub struct SceneFile {
     /// The joints between them.
     #[serde(default)]
     pub joints: Vec<JointFile>,
-    /// What brings more bodies while the scene runs.
+    /// Spawners, which add bodies while the scene runs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spawners: Vec<SpawnerFile>,
 }
 
-/// Brings bodies that are alike while a scene runs: before a step, one every so many steps, later where their place is taken.
+/// Adds equal bodies while a scene runs: one before a step, at a regular interval, or later if its place is occupied.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Spawner")]
 pub struct SpawnerFile {
-    /// The body as it comes; it may say when it leaves.
+    /// The body at its start; it can say when it leaves.
     pub body: BodyFile,
-    /// Steps before the first comes.
+    /// Steps before the first body.
     #[serde(default)]
     pub first: u32,
-    /// Steps from one to the next, at least 1.
+    /// Steps from one body to the next, at least 1.
     #[schemars(range(min = 1))]
     pub every: u32,
-    /// How many come in all; without end if left out.
+    /// Total number of bodies; unlimited by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub count: Option<u32>,
 }
 
-/// When a body leaves the scene: as soon as either holds.
+/// When a body leaves the scene: as soon as one of the conditions holds.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Leaves")]
 pub struct LeavesFile {
-    /// When its center of mass is below this height (m).
+    /// Its center of mass is below this height (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub below: Option<f64>,
-    /// After this time (s), 0 or more.
+    /// This time is over (s), 0 or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<f64>,
 }
@@ -114,9 +114,9 @@ pub struct LeavesFile {
 #[serde(deny_unknown_fields, default)]
 #[schemars(title = "Body")]
 pub struct BodyFile {
-    /// Name for people; "body N" for body N, counted from 0, if left out.
+    /// Name for messages; by default "body N" for body N, counted from 0.
     pub name: Option<String>,
-    /// Who decides how it moves.
+    /// How the body moves: fixed, kinematic or dynamic.
     pub kind: BodyKind,
     /// Origin of the body's frame (m).
     pub position: [f64; 3],
@@ -126,30 +126,30 @@ pub struct BodyFile {
     pub linear_velocity: [f64; 3],
     /// Angular velocity in world axes (rad/s), up to 1e9 along each axis; zero for a fixed body.
     pub angular_velocity: [f64; 3],
-    /// Force through the center of mass, besides gravity (N); zero unless dynamic.
+    /// Force through the center of mass, in addition to gravity (N); zero unless dynamic.
     pub force: [f64; 3],
     /// Torque in world axes (N m); zero unless dynamic.
     pub torque: [f64; 3],
-    /// The share of gravity that a dynamic body feels: 0 floats, -1 rises as fast as others fall.
+    /// Factor on the gravity of a dynamic body: 0 floats, -1 rises as fast as others fall.
     pub gravity_scale: f64,
-    /// Density of all shapes (kg/m³), more than 0. 1000 for a dynamic body that says nothing about its mass.
+    /// Density of all shapes (kg/m³), more than 0. The default is 1000 for a dynamic body without a mass.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
     /// Total mass (kg), more than 0, instead of the density.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
-    /// Mass, center and inertia, instead of those of the shapes.
+    /// Mass, center and inertia, instead of the values from the shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass_properties: Option<MassFile>,
-    /// Coulomb coefficient, 0 or more. Two bodies meet with the geometric mean of theirs.
+    /// Coulomb coefficient, 0 or more. A contact has the geometric mean of both bodies.
     pub friction: f64,
-    /// Ratio of separation to approach velocity, 0 to 1. Two bodies meet with the larger of theirs.
+    /// Ratio of separation to approach velocity, 0 to 1. A contact has the larger value of both bodies.
     pub restitution: f64,
-    /// Which bodies it meets: 32 groups, one bit each.
+    /// Collision groups: which bodies it collides with. 32 groups, one bit each.
     pub groups: Groups,
-    /// Whether it is a bullet, which passes through nothing that moves.
+    /// Whether the body is a bullet, which does not pass through moving bodies.
     pub swept: bool,
-    /// When it leaves the scene; never if left out.
+    /// When the body leaves the scene; never by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaves: Option<LeavesFile>,
     /// Shapes on the body; several make a compound.
@@ -181,7 +181,7 @@ impl Default for BodyFile {
     }
 }
 
-/// Mass, center of mass and inertia of a body, in its own frame.
+/// Mass, center of mass and inertia of a body, in the body's frame.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Mass properties")]
@@ -198,7 +198,7 @@ pub struct MassFile {
     pub principal_frame: [f64; 4],
 }
 
-/// A shape at a place on a body.
+/// A shape at a pose on a body.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[schemars(title = "Shape", extend("unevaluatedProperties" = false))]
 pub struct ShapeFile {
@@ -208,10 +208,10 @@ pub struct ShapeFile {
     /// Rotation in the body's frame: a quaternion x, y, z, w of length 1 within 0.001.
     #[serde(default = "defaults::rotation")]
     pub rotation: [f64; 4],
-    /// Whether the shape is a sensor: it meets others without contacts.
+    /// Whether the shape is a sensor. A sensor detects other shapes and has no contacts.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sensor: bool,
-    /// The shape itself. Refuses the keys that are unknown to both.
+    /// The geometry of the shape. A key that neither part knows is refused.
     #[serde(flatten)]
     pub geometry: Geometry,
 }
@@ -259,7 +259,7 @@ pub enum Geometry {
     },
     /// All points p with p · normal <= 0; on fixed bodies only.
     HalfSpace {
-        /// Points out of the solid; of length 1 within 0.001.
+        /// The outward normal, of length 1 within 0.001.
         normal: [f64; 3],
     },
     /// A triangle mesh; not on dynamic bodies.
@@ -271,46 +271,46 @@ pub enum Geometry {
     },
     /// Heights over a rectangle of the xz plane around the origin; not on dynamic bodies.
     HeightField {
-        /// Rows along z of heights along x, in units of the scale's y.
+        /// Rows along z of heights along x, in units of the y component of `scale`.
         heights: Vec<Vec<f64>>,
         /// Length along x, unit of the heights, length along z.
         scale: [f64; 3],
     },
 }
 
-/// A joint of a scene file. Needs an anchor or anchors.
+/// A joint of a scene file. It needs `anchor` or `anchors`.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[schemars(title = "Joint", extend("unevaluatedProperties" = false))]
 pub struct JointFile {
-    /// One body, which is tied to the world, or two; at least one of them dynamic. Places, angles and speeds of a joint are those of the first
-    /// against the second.
+    /// One body, tied to the world, or two bodies. At least one has to be dynamic. Positions, angles and speeds of a
+    /// joint are those of the first body relative to the second.
     #[schemars(length(min = 1, max = 2))]
     pub bodies: Vec<BodyRef>,
-    /// The point where the bodies are tied as they stand, in the world (m).
+    /// The anchor in the world, at the initial poses of the bodies (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub anchor: Option<[f64; 3]>,
-    /// The point in the frame of each body (m); with one body, the second is in the world.
+    /// The anchor in the frame of each body (m); with one body, the second anchor is in the world.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub anchors: Option<[[f64; 3]; 2]>,
     /// Whether the two bodies still collide with each other.
     #[serde(default)]
     pub collide: bool,
-    /// The force at which it breaks (N), the mean over a step, more than 0; it holds any if left out.
+    /// The force at which the joint breaks (N), averaged over a step, more than 0; by default the joint never breaks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub break_force: Option<f64>,
-    /// The kind of joint. Refuses the keys that are unknown to both.
+    /// The kind of joint. A key that neither part knows is refused.
     #[serde(flatten)]
     pub kind: JointKind,
 }
 
-/// Reads limits, of which null is an infinite one: JSON has no infinity, and an infinite number is written as null.
+/// Reads limits. Null is an infinite limit: JSON has no infinity, and the writer writes null for it.
 fn limits_or_null<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<[f64; 2]>, D::Error> {
     let limits = Option::<[Option<f64>; 2]>::deserialize(reader)
         .map_err(|e| serde::de::Error::custom(format_args!("limits: {e}")))?;
     Ok(limits.map(|[min, max]| [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)]))
 }
 
-/// What a joint leaves free. Angles are zero as the bodies stand.
+/// The free axes of a joint. Angles are zero at the initial poses of the bodies.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 #[schemars(title = "Kind of joint")]
@@ -318,11 +318,11 @@ fn limits_or_null<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<[f64; 2
 pub enum JointKind {
     /// Keeps the points together.
     Ball {},
-    /// Nothing.
+    /// No free axis.
     Fixed {},
-    /// Turning about an axis.
+    /// Rotation about an axis.
     Hinge {
-        /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
+        /// Direction of the axis in the world, at the initial poses of the bodies; of length 1 within 0.001.
         axis: [f64; 3],
         /// Least and largest angle (rad), -pi to pi.
         #[serde(default, deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
@@ -335,11 +335,11 @@ pub enum JointKind {
         #[serde(skip_serializing_if = "Option::is_none")]
         spring: Option<SpringFile>,
     },
-    /// Shifting along an axis.
+    /// Translation along an axis.
     Slider {
-        /// Direction of the axis in the world, as the bodies stand; of length 1 within 0.001.
+        /// Direction of the axis in the world, at the initial poses of the bodies; of length 1 within 0.001.
         axis: [f64; 3],
-        /// Least and largest place (m); null for no limit on that side.
+        /// Smallest and largest position (m); null for no limit on that side.
         #[serde(default, deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<[Option<f64>; 2]>")]
         limits: Option<[f64; 2]>,
@@ -350,9 +350,9 @@ pub enum JointKind {
         #[serde(skip_serializing_if = "Option::is_none")]
         spring: Option<SpringFile>,
     },
-    /// All but the distance of the points: a rope, a rod or a spring.
+    /// Only the distance of the anchors is restricted: a rope, a rod or a spring.
     Distance {
-        /// Least and largest distance (m), the same of a rod; null for no limit on that side.
+        /// Smallest and largest distance (m), equal for a rod; null for no limit on that side.
         #[serde(default, deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<[Option<f64>; 2]>")]
         limits: Option<[f64; 2]>,
@@ -363,31 +363,32 @@ pub enum JointKind {
         #[serde(skip_serializing_if = "Option::is_none")]
         spring: Option<SpringFile>,
     },
-    /// What each of the axes says.
+    /// Each axis has its own settings.
     Generic {
-        /// Rotation from the axes of the joint to the world, as the bodies stand: a quaternion x, y, z, w of length 1 within 0.001.
+        /// Rotation from the axes of the joint to the world, at the initial poses of the bodies: a quaternion x, y, z,
+        /// w of length 1 within 0.001.
         #[serde(default = "defaults::rotation")]
         frame: [f64; 4],
-        /// Rotations from the axes of the joint to the frame of each body, instead of `frame`; with one body, the second is to the world. Angles
-        /// are zero where they agree.
+        /// Rotations from the axes of the joint to the frame of each body, instead of `frame`; with one body, the
+        /// second rotation is to the world. Angles are zero where both agree.
         #[serde(skip_serializing_if = "Option::is_none")]
         frames: Option<[[f64; 4]; 2]>,
-        /// Shifts along the three axes (m).
+        /// Translations along the three axes (m).
         linear: Box<[AxisFile; 3]>,
-        /// Turns about the three axes (rad).
+        /// Rotations about the three axes (rad).
         angular: Box<[AxisFile; 3]>,
     },
 }
 
-/// One axis of a generic joint; free if it says nothing.
+/// One axis of a generic joint; free by default.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(title = "Axis")]
 pub struct AxisFile {
-    /// Whether it is held at zero; limits are then not given.
+    /// Whether the axis is held at zero; it then has no limits.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub locked: bool,
-    /// Least and largest place (m) or angle (rad); null for no limit on that side of a place.
+    /// Smallest and largest position (m) or angle (rad); null for no limit of a position on that side.
     #[serde(deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<[Option<f64>; 2]>")]
     pub limits: Option<[f64; 2]>,
@@ -404,9 +405,9 @@ pub struct AxisFile {
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Motor")]
 pub struct MotorFile {
-    /// The speed that it holds (m/s, rad/s). 0 makes dry friction.
+    /// The target speed (m/s, rad/s). 0 makes dry friction.
     pub speed: f64,
-    /// The most that it pushes or pulls (N, N m).
+    /// The largest force or torque (N, N m).
     pub max_load: f64,
 }
 
@@ -415,26 +416,26 @@ pub struct MotorFile {
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Spring")]
 pub struct SpringFile {
-    /// Where it is at rest (m, rad).
+    /// The rest position (m, rad).
     #[serde(default)]
     pub target: f64,
-    /// How often a second what it moves swings without damper (Hz), more than 0.
+    /// Frequency of the moved mass without damping (Hz), more than 0.
     pub frequency: f64,
-    /// 0 without damping, 1 where it no longer swings.
+    /// Damping ratio: 0 is undamped, 1 is critically damped.
     #[serde(default = "defaults::damping_ratio")]
     pub damping_ratio: f64,
-    /// The most that it pushes or pulls (N, N m); any if left out.
+    /// The largest force or torque (N, N m); unlimited by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_load: Option<f64>,
 }
 
-/// Which body of the scene.
+/// A body of the scene.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(untagged, expecting = "a body is named by its index from 0 or by its name")]
 pub enum BodyRef {
     /// Its index, counted from 0.
     Index(usize),
-    /// Its name, which no other body may have.
+    /// Its name, which has to be unique.
     Name(String),
 }
 

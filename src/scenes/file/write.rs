@@ -1,4 +1,4 @@
-//! From a world, at rest or in motion, to a scene file that says the same.
+//! Converts a world, at rest or in motion, to a scene file.
 
 use parry3d::shape::TypedShape;
 
@@ -11,14 +11,15 @@ use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
 use crate::world::{Axis, Body, BodyKind, Bounds, Collider, Drive, Joint, Linear};
 
-/// The file of a scene: every number as it is, to the last bit. A body has the index in the file that it has among the bodies that are there.
+/// The file of a scene, with every number to the last bit. The index of a body in the file counts only bodies that are
+/// present.
 pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
     let world = &scene.world;
     let worlds = world.world_count();
     ensure(worlds == 1, || format!("a scene file holds one world, and there are {worlds} beside each other"))?;
     if let Some(i) = world.first_non_finite() {
         return Err(input!(
-            "body {i} {:?}: its numbers are not finite: no scene file can say them",
+            "body {i} {:?}: its numbers are not finite: a scene file cannot represent them",
             world.bodies[i].name
         ));
     }
@@ -47,7 +48,7 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
     })
 }
 
-/// A number whose text is short, and which is the same in single precision.
+/// The shortest decimal number that gives the same value in single precision.
 fn number(x: f32) -> f64 {
     let short = x.to_string().parse().unwrap_or(f64::from(x));
     if short as f32 == x { short } else { f64::from(x) }
@@ -113,7 +114,7 @@ fn shape(c: &Collider) -> Result<ShapeFile> {
                 scale: numbers(field.scale().to_array()),
             }
         }
-        _ => return Err(input!("a shape of type {:?}: no scene file can say it", c.shape)),
+        _ => return Err(input!("a shape of type {:?}: a scene file cannot represent it", c.shape)),
     };
     let (position, rotation) = (numbers(c.position.to_array()), numbers(c.rotation.to_array()));
     Ok(ShapeFile { position, rotation, sensor: c.sensor, geometry })
@@ -127,7 +128,7 @@ fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {
             JointKind::Distance { limits, motor, spring }
         }
         Linear::Distance(_) => {
-            return Err(input!("its distance and its angles are guided: no scene file can say both"));
+            return Err(input!("it restricts both its distance and its angles: a scene file cannot represent both"));
         }
         Linear::Axes(linear) => JointKind::Generic {
             frame: [0.0, 0.0, 0.0, 1.0],

@@ -1,4 +1,4 @@
-//! W in blocks of contacts, without bodies: (1 + D W) x = b as it stands, three unknowns a contact.
+//! W in blocks of contacts, without bodies. It solves (1 + D W) x = b directly, with three unknowns a contact.
 
 use glam::{DMat3, DVec3};
 
@@ -6,7 +6,7 @@ use super::factor::Factor;
 use super::system::{Cone, System};
 use crate::contacts::LocalProblem;
 
-/// A problem that is given by its W.
+/// A problem in the form of its W.
 ///
 /// ```
 /// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
@@ -25,14 +25,14 @@ pub struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    /// Of a problem; sweeps go over the colors of its contacts.
+    /// The system of a problem. Sweeps follow the colors of its contacts.
     pub fn new(problem: &'a LocalProblem) -> Self {
         let cone = |i: usize| Cone::new(problem.friction[i], problem.free[i], problem.block(i));
         let count = problem.rows.len();
         Self { problem, cones: (0..count).map(cone).collect(), sequence: problem.colors().concat(), factor: None }
     }
 
-    /// The factor, with its elimination in order.
+    /// The factor, with its elimination order computed.
     fn ordered(&mut self) -> Factor<3> {
         let rows = &self.problem.rows;
         let ties = (0..).zip(rows).flat_map(|(i, row)| row.iter().map(move |&(j, _)| [i, j]));

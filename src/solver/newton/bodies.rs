@@ -1,7 +1,7 @@
-//! W = J M⁻¹ Jᵀ of rigid bodies, through the bodies.
+//! W = J M⁻¹ Jᵀ of rigid bodies, in terms of the bodies.
 //!
-//! With the square root of the masses in the rows of J, W = J Jᵀ, and with v = Jᵀ x the system (1 + D W) x = b is
-//! (1 + Jᵀ D J) v = Jᵀ b: six unknowns a body, and regular however many contacts a body has.
+//! With the inverse square roots of the masses inside the rows of J, W = J Jᵀ. With v = Jᵀ x, the system (1 + D W) x =
+//! b becomes (1 + Jᵀ D J) v = Jᵀ b. It has six unknowns a body, and is regular for any number of contacts.
 
 use std::array::from_fn;
 
@@ -31,7 +31,7 @@ pub struct Bodies {
     cones: Vec<Cone>,
     sequence: Vec<u32>,
     bodies: usize,
-    /// The movable sides of all contacts, and where those of each contact begin.
+    /// The movable sides of all contacts, and the index of the first side of each contact.
     sides: Vec<Side>,
     begin: Vec<usize>,
     factor: Option<Factor<6>>,
@@ -44,7 +44,7 @@ struct Side {
 }
 
 impl Bodies {
-    /// Of a problem; sweeps go contact by contact.
+    /// The system of a problem. Sweeps go contact by contact.
     pub fn new(problem: &ContactProblem) -> Self {
         let operator = Operator::new(problem);
         let free: Vec<_> = problem.bodies.iter().map(|b| b.free).collect();
@@ -79,7 +79,7 @@ impl Bodies {
         &self.sides[self.begin[contact]..self.begin[contact + 1]]
     }
 
-    /// The factor, with its elimination in order.
+    /// The factor, with its elimination order computed.
     fn ordered(&mut self) -> Factor<6> {
         let ties = |range: &[usize]| match &self.sides[range[0]..range[1]] {
             [a, b] => Some([a.body, b.body]),
@@ -160,7 +160,7 @@ impl System for Bodies {
     }
 }
 
-/// The lower factor R of a definite matrix R Rᵀ.
+/// The lower triangular factor R of a positive definite matrix R Rᵀ.
 fn root(m: DMat3) -> DMat3 {
     let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = m.to_cols_array_2d();
     let x = xx.sqrt();

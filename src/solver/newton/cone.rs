@@ -1,11 +1,12 @@
-//! The condition of one contact: û = u + mu |u_t| n and r are complementary in Coulomb's cone and its dual.
+//! The condition of one contact: û = u + mu |u_t| n and r are complementary in the dual of Coulomb's cone and in the
+//! cone.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::system::Cone;
 use crate::residuals::natural_map;
 
-/// u + mu |u_t| n (De Saxcé and Feng 1998), and its derivative by u; where nothing slips, one of them.
+/// u + mu |u_t| n (De Saxcé and Feng 1998), and a derivative by u. Without slip there are several, and this is one.
 pub(super) fn augmented(mu: f64, u: DVec3) -> (DVec3, DMat3) {
     let tangent = DVec2::new(u.y, u.z);
     let slip = tangent.length();
@@ -14,7 +15,7 @@ pub(super) fn augmented(mu: f64, u: DVec3) -> (DVec3, DMat3) {
     (u + DVec3::X * (mu * slip), DMat3::from_cols(columns[0], columns[1], columns[2]))
 }
 
-/// `e_vel` of impulses and the velocities u that belong to them.
+/// `e_vel` of impulses `r` and their velocities `u`.
 pub(super) fn error(cones: &[Cone], r: &[DVec3], u: impl Iterator<Item = DVec3>) -> f64 {
     let (mut left, mut free) = (0.0, 0.0);
     for ((cone, &r), u) in cones.iter().zip(r).zip(u) {

@@ -1,8 +1,8 @@
-//! In which order the blocks of a sparse matrix are eliminated.
+//! The elimination order of the blocks of a sparse matrix.
 
 use std::collections::BTreeSet;
 
-/// The order of least degree: the place of each node, and by place the later places that fill included it is tied to.
+/// The minimum-degree order. Returns the place of each node, and for each place its later neighbors, including fill.
 pub(super) fn eliminate(nodes: usize, ties: impl IntoIterator<Item = [u32; 2]>) -> (Vec<u32>, Vec<Vec<u32>>) {
     let mut near: Vec<Vec<u32>> = vec![Vec::new(); nodes];
     for [a, b] in ties {
@@ -14,7 +14,7 @@ pub(super) fn eliminate(nodes: usize, ties: impl IntoIterator<Item = [u32; 2]>) 
         near.dedup();
         near.retain(|&other| other as usize != node);
     }
-    // Nodes by degree, equal ones by index: the order is the same on every machine.
+    // Nodes by degree, then by index: the order is the same on every machine.
     let mut queue: BTreeSet<(usize, u32)> = (0..nodes).map(|i| (near[i].len(), i as u32)).collect();
     let (mut place, mut below, mut order) = (vec![0; nodes], Vec::with_capacity(nodes), Vec::with_capacity(nodes));
     while let Some((_, node)) = queue.pop_first() {
@@ -37,7 +37,7 @@ pub(super) fn eliminate(nodes: usize, ties: impl IntoIterator<Item = [u32; 2]>) 
     (place, below)
 }
 
-/// Two ascending lists as one, without two nodes.
+/// The union of two ascending lists, without two nodes.
 fn union(a: &[u32], b: &[u32], without: [u32; 2]) -> Vec<u32> {
     let mut all = Vec::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().copied().peekable(), b.iter().copied().peekable());

@@ -1,4 +1,5 @@
-//! Sparse LU factors of a matrix in N x N blocks whose pattern is symmetric: blocks are eliminated in the order of least degree.
+//! Sparse LU factors of a matrix in N x N blocks with a symmetric pattern. Blocks are eliminated in minimum-degree
+//! order.
 
 use std::array::from_fn;
 
@@ -7,7 +8,7 @@ use super::elimination::eliminate;
 /// A dense block, by rows.
 pub type Block<const N: usize> = [[f64; N]; N];
 
-/// The matrix, and then its factors in its place.
+/// The matrix, which its factors later replace.
 ///
 /// ```
 /// use drystone::solver::newton::Factor;
@@ -26,24 +27,24 @@ pub type Block<const N: usize> = [[f64; N]; N];
 /// ```
 #[derive(Clone, Debug)]
 pub struct Factor<const N: usize> {
-    /// The place of each node in the order of elimination.
+    /// The place of each node in the elimination order.
     place: Vec<u32>,
-    /// By place: the later places that its elimination ties it to, ascending.
+    /// For each place: the later places that are coupled to it at its elimination, ascending.
     below: Vec<Vec<u32>>,
-    /// By place: where its blocks begin in `lower` and `upper`.
+    /// For each place: the index of its first block in `lower` and `upper`.
     begin: Vec<usize>,
-    /// By place: the diagonal blocks, and then their factors: below the diagonal L, above and on it U.
+    /// For each place: the diagonal block, later its factors: L below the diagonal, U on and above it.
     diagonal: Vec<Block<N>>,
-    /// By place: which row of the block is which row of L U.
+    /// For each place: the row of the block for each row of L U.
     pivots: Vec<[u8; N]>,
-    /// By place and entry of `below`: block (below, place).
+    /// For each place and entry of `below`: block (below, place).
     lower: Vec<Block<N>>,
-    /// By place and entry of `below`: block (place, below).
+    /// For each place and entry of `below`: block (place, below).
     upper: Vec<Block<N>>,
 }
 
 impl<const N: usize> Factor<N> {
-    /// The pattern of `nodes` diagonal blocks and of the blocks that `ties` name, in both directions.
+    /// The pattern with `nodes` diagonal blocks, and with the blocks of `ties` in both directions.
     pub fn new(nodes: usize, ties: impl IntoIterator<Item = [u32; 2]>) -> Self {
         let (place, below) = eliminate(nodes, ties);
         let mut begin = vec![0];
@@ -63,13 +64,13 @@ impl<const N: usize> Factor<N> {
         }
     }
 
-    /// Multiplications of [`Self::factor`].
+    /// Number of multiplications of [`Self::factor`].
     pub fn multiplications(&self) -> f64 {
         let products = |rows: &Vec<u32>| (1 + rows.len()).pow(2) as f64;
         (N as f64).powi(3) * self.below.iter().map(products).sum::<f64>()
     }
 
-    /// The unit matrix.
+    /// Resets the matrix to the identity.
     pub fn clear(&mut self) {
         let unit = from_fn(|i| from_fn(|j| f64::from(u8::from(i == j))));
         self.diagonal.fill(unit);
@@ -77,10 +78,10 @@ impl<const N: usize> Factor<N> {
         self.upper.fill([[0.0; N]; N]);
     }
 
-    /// The block (row, column), to be added to.
+    /// The block (row, column), for addition.
     ///
     /// # Panics
-    /// The pattern does not have it.
+    /// The pattern does not have this block.
     pub fn block_mut(&mut self, row: u32, column: u32) -> &mut Block<N> {
         let [row, column] = [row, column].map(|node| self.place[node as usize]);
         let entry = |first: u32, second: u32| {
@@ -100,7 +101,7 @@ impl<const N: usize> Factor<N> {
         }
     }
 
-    /// Factors the matrix; none if a pivot is singular.
+    /// Factors the matrix. Returns `None` if a pivot is singular.
     pub fn factor(&mut self) -> Option<()> {
         for k in 0..self.diagonal.len() {
             self.pivots[k] = decompose(&mut self.diagonal[k])?;
@@ -109,7 +110,7 @@ impl<const N: usize> Factor<N> {
                 right_divide(&mut self.lower[m], &self.diagonal[k]);
                 left_divide(&mut self.upper[m], &self.diagonal[k], &self.pivots[k]);
             }
-            // Block (i, j) of what remains loses L_ik U_kj.
+            // Subtract L_ik U_kj from block (i, j) of the remaining matrix.
             for (n, &j) in self.below[k].iter().enumerate() {
                 let j = j as usize;
                 let (l, u) = (self.lower[begin + n], self.upper[begin + n]);
@@ -130,7 +131,7 @@ impl<const N: usize> Factor<N> {
         Some(())
     }
 
-    /// Solves with the factors, in place; `x` is by nodes.
+    /// Solves with the factors, in place. `x` is indexed by nodes.
     pub fn solve(&self, x: &mut [[f64; N]]) {
         let mut y = vec![[0.0; N]; x.len()];
         for (node, &place) in self.place.iter().enumerate() {
@@ -181,8 +182,8 @@ fn times<const N: usize>(a: &Block<N>, x: &[f64; N]) -> [f64; N] {
     from_fn(|i| (0..N).map(|j| a[i][j] * x[j]).sum())
 }
 
-/// P A = L U with the largest pivot of each column, in place; returns which row of A is each row of L U. None if the block is
-/// singular or has a number that is not finite.
+/// Factors P A = L U in place, with the largest pivot of each column. Returns the row of A for each row of L U, or
+/// `None` if the block is singular or has a number that is not finite.
 fn decompose<const N: usize>(a: &mut Block<N>) -> Option<[u8; N]> {
     let mut rows: [u8; N] = from_fn(|i| i as u8);
     for k in 0..N {
@@ -203,7 +204,7 @@ fn decompose<const N: usize>(a: &mut Block<N>) -> Option<[u8; N]> {
     a.iter().flatten().all(|x| x.is_finite()).then_some(rows)
 }
 
-/// B U⁻¹ in the place of B.
+/// Replaces B by B U⁻¹.
 fn right_divide<const N: usize>(b: &mut Block<N>, lu: &Block<N>) {
     for row in b {
         for j in 0..N {
@@ -212,7 +213,7 @@ fn right_divide<const N: usize>(b: &mut Block<N>, lu: &Block<N>) {
     }
 }
 
-/// L⁻¹ P B in the place of B.
+/// Replaces B by L⁻¹ P B.
 fn left_divide<const N: usize>(b: &mut Block<N>, lu: &Block<N>, rows: &[u8; N]) {
     *b = from_fn(|i| b[rows[i] as usize]);
     for i in 1..N {
@@ -228,7 +229,7 @@ mod tests {
     use super::*;
     use crate::random::SplitMix64;
 
-    /// A grid of 4 x 3 nodes, entry by entry with no order, and its dense double.
+    /// A grid of 4 x 3 nodes, entry by entry without an order, and the same matrix in dense form.
     fn matrix(stiffness: f64) -> (Factor<3>, Vec<Vec<f64>>) {
         let ties: Vec<[u32; 2]> = (0..12)
             .flat_map(|i| [(i % 4 < 3).then_some([i, i + 1]), (i < 8).then_some([i + 4, i])])

@@ -1,9 +1,9 @@
-//! Newton's method on the central path of a contact problem: û = W r + q + mu |u_t| n stays inside of the dual of Coulomb's cone, r
-//! inside of the cone, and their product falls to zero (docs/derivation.md, section 10).
+//! Newton's method on the central path of a contact problem. û = W r + q + mu |u_t| n stays inside the dual of
+//! Coulomb's cone, r stays inside the cone, and their product goes to zero (docs/derivation.md, section 10).
 //!
-//! Predictor and corrector of Mehrotra (1992) with the scaling of Nesterov and Todd (1998), as Acary, Armand, Nguyen and Shpakovych
-//! (2024) solve the convex relaxation. Here the slip mu |u_t| is a part of the system, with its derivative E, so that the limit is
-//! Coulomb's law itself.
+//! It uses the predictor and corrector of Mehrotra (1992) with the scaling of Nesterov and Todd (1998). Acary, Armand,
+//! Nguyen and Shpakovych (2024) solve the convex relaxation this way. Here the slip mu |u_t| and its derivative E are
+//! part of the system, so that the limit is Coulomb's law itself.
 
 use glam::{DMat3, DVec3};
 
@@ -11,22 +11,22 @@ use super::cone::{augmented, error};
 use super::scaling::{Scaling, depth, longest, product, quotient};
 use super::system::{Cone, System};
 
-/// Share of the way to the mantle that a step goes at most.
+/// Largest share of the way to the boundary that a step takes.
 const FRACTION: f64 = 0.95;
-/// Least product of the depths of r and û at a contact, as a share of the mean product.
+/// Smallest product of the depths of r and û at a contact, relative to the mean product.
 const NEIGHBORHOOD: f64 = 1e-2;
-/// Times that a solution is refined. With one less, 4 of 10 problems end at 1e-8 to 3e-8 and not below.
+/// Number of refinements of a solution. With one less, 4 of 10 problems end at 1e-8 to 3e-8 and not below.
 const REFINEMENTS: usize = 3;
-/// Steps that are shorter come to nothing.
+/// A shorter step counts as blocked.
 const LEAST_LENGTH: f64 = 1e-9;
-/// Least share of the product that a step aims at.
+/// Smallest target of a step, as a share of the product.
 const LEAST_CENTERING: f64 = 1e-8;
 
 /// An iterate.
 pub(super) struct Interior {
-    /// Impulses, strictly inside of their cones.
+    /// Impulses, strictly inside their cones.
     pub r: Vec<DVec3>,
-    /// T⁻¹ û, strictly inside of the cone |z_t| <= z_n.
+    /// T⁻¹ û, strictly inside the cone |z_t| <= z_n.
     z: Vec<DVec3>,
     /// T of each contact: (mu, 1, 1), or 1 without friction.
     scale: Vec<DVec3>,
@@ -34,24 +34,25 @@ pub(super) struct Interior {
     u: Vec<DVec3>,
     /// `e_vel` of r.
     pub error: f64,
-    /// Whether the second order of a step counts as much as the predicted step was long.
+    /// Whether the second-order correction is scaled by the length of the predicted step.
     careful: bool,
 }
 
-/// What a step is made of, at each contact.
+/// The terms of a step at each contact.
 struct Point {
     scaling: Scaling,
     /// E in the coordinates of z.
     slope: DMat3,
-    /// How far T⁻¹ û is from z.
+    /// The difference between T⁻¹ û and z.
     gap: DVec3,
     /// S x = S⁻¹ z.
     middle: DVec3,
 }
 
 impl Interior {
-    /// The start: every contact pushes as hard as any other, and parts as fast, so that all products are equal however the masses
-    /// differ. A careful one takes more steps, and comes through where the way is blocked for others.
+    /// The starting point: every contact has the same normal impulse and the same separation speed, so all products are
+    /// equal for any masses. A careful iteration takes more steps, and succeeds on some problems where others get
+    /// blocked.
     pub fn new(system: &impl System, careful: bool) -> Self {
         let cones = system.cones();
         let mean = |of: fn(&Cone) -> f64| cones.iter().map(of).sum::<f64>() / cones.len() as f64;
@@ -89,7 +90,7 @@ impl Interior {
         Point { scaling, slope, gap: augmented / self.scale[i] - z, middle: scaling.apply(|e| e, x) }
     }
 
-    /// One step, which aims at the error `tolerance`. None if it comes to nothing: the matrix is singular, or the way is blocked.
+    /// One step towards the error `tolerance`. Returns `None` if the matrix is singular or the step is blocked.
     pub fn step(&mut self, system: &mut impl System, tolerance: f64) -> Option<()> {
         let points: Vec<_> = system.cones().iter().enumerate().map(|(i, cone)| self.point(i, cone)).collect();
         let d =
@@ -101,7 +102,7 @@ impl Interior {
         let predicted = self.direction(system, &points, points.iter().map(square));
         let length = self.longest(&predicted).min(1.0);
         let left = (self.moved(&predicted, length).mean_product() / before).clamp(0.0, 1.0);
-        // No less than what the error asks for: below that rounding is all that grows.
+        // Use no smaller target than the error requires: below it only rounding errors grow.
         let centering = left.powi(3).max(LEAST_CENTERING).max((0.2 * tolerance / self.error).min(1.0));
 
         let trust = if self.careful { length } else { 1.0 };
@@ -115,7 +116,7 @@ impl Interior {
         let mut next = self.moved(&direction, length);
         while !next.is_central() {
             length *= 0.8;
-            // NaN ends here, too.
+            // The iteration also ends here on NaN.
             if length.is_nan() || length <= LEAST_LENGTH {
                 return None;
             }
@@ -126,7 +127,7 @@ impl Interior {
         self.error.is_finite().then_some(())
     }
 
-    /// Whether no contact is much nearer to the mantle than the others.
+    /// Whether no contact is much nearer to the boundary than the others.
     fn is_central(&self) -> bool {
         let least = NEIGHBORHOOD * self.mean_product();
         (0..self.r.len()).all(|i| depth(self.x(i)) * depth(self.z[i]) >= least)
@@ -158,7 +159,7 @@ impl Interior {
     ) -> (Vec<DVec3>, Vec<DVec3>) {
         let aims = points.iter().zip(products).map(|(p, product)| p.scaling.apply(|e| e, quotient(product, p.middle)));
         let aims: Vec<_> = aims.collect();
-        // (S² T + E W) dr = aim - gap, refined by what is left of it.
+        // (S² T + E W) dr = aim - gap, with iterative refinement.
         let right: Vec<_> = aims.iter().zip(points).map(|(&aim, p)| aim - p.gap).collect();
         let (mut dr, mut left) = (vec![DVec3::ZERO; right.len()], right.clone());
         for pass in 0..=REFINEMENTS {

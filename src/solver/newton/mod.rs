@@ -1,10 +1,12 @@
-//! A contact problem to the end, in f64: accelerated sweeps while they pay, Newton's method on the central path where they do not.
+//! Solves a contact problem to convergence in f64. It uses accelerated sweeps while they are efficient, then Newton's
+//! method on the central path.
 //!
-//! Sweeps need thousands of passes where a heavy body stands on light ones, or many bodies on each other. A step of Newton's method
-//! solves a sparse linear system instead ([`System`]: six unknowns a body, or three a contact where a problem is given without
-//! bodies), and tens of steps come to 1e-8 on towers of every mass ratio. Where the central path turns back, as it does in some towers
-//! of planks, Newton's method ends above 1e-8, and sweeps go on from there. docs/derivation.md, section 10, has the method;
-//! docs/convergence.md compares it with the solvers of Siconos, and docs/contacts-format.md says which problems stay unsolved.
+//! Sweeps need thousands of passes if a heavy body stands on light ones, or if many bodies are stacked. A step of
+//! Newton's method solves a sparse linear system instead ([`System`]): six unknowns a body, or three a contact if the
+//! problem has no bodies. Tens of steps reach 1e-8 on towers of every mass ratio. In some towers of planks the central
+//! path turns back: Newton's method then ends above 1e-8, and sweeps continue from there. docs/derivation.md, section
+//! 10, describes the method. docs/convergence.md compares it with the solvers of Siconos, and docs/contacts-format.md
+//! lists the problems that stay unsolved.
 
 mod blocks;
 mod bodies;
@@ -27,21 +29,21 @@ use glam::DVec3;
 use crate::config::Method;
 use interior::Interior;
 
-/// Sweeps after which the error is looked at.
+/// Number of sweeps between two checks of the error.
 const STRIDE: u32 = 4;
-/// How often it is looked at before sweeps are judged: Newton's method has nothing prepared until then.
+/// Number of checks before sweeps are judged. Newton's method prepares nothing until then.
 const FIRST_STRIDES: usize = 8;
-/// Steps that Newton's method is taken to need, when the work that is left is compared.
+/// Assumed number of Newton steps, for the comparison of the remaining work.
 const EXPECTED_STEPS: f64 = 20.0;
-/// Most steps of Newton's method.
+/// Largest number of Newton steps.
 const MOST_STEPS: u32 = 100;
-/// Steps in which the least error must fall by a tenth.
+/// Number of steps in which the smallest error must fall by a tenth.
 const PATIENCE: u32 = 12;
 
-/// Error, in tolerances, below which sweeps go on where Newton's method ended.
+/// Error, in units of the tolerance, below which sweeps continue after Newton's method.
 const LAST_DIGITS: f64 = 100.0;
 
-/// What ended a solve.
+/// The reason why a solve ended.
 ///
 /// ```
 /// use drystone::{contacts::LocalProblem, solver::newton::{Blocks, Ended, newton}};
@@ -54,17 +56,17 @@ const LAST_DIGITS: f64 = 100.0;
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Ended {
-    /// The sweeps before Newton's method came to the tolerance.
+    /// The sweeps before Newton's method reached the tolerance.
     FirstSweeps,
-    /// Newton's method came to the tolerance.
+    /// Newton's method reached the tolerance.
     Newton,
-    /// Newton's method came to nothing, and the sweeps after it came to the tolerance.
+    /// Newton's method ended without reaching the tolerance, and the sweeps after it reached it.
     LastSweeps,
-    /// Nothing came to the tolerance.
+    /// The tolerance was not reached.
     Limit,
 }
 
-/// What ended Newton's method.
+/// The reason why Newton's method ended.
 ///
 /// ```
 /// use drystone::{contacts::LocalProblem, solver::newton::{Blocks, NewtonEnded, newton}};
@@ -76,17 +78,17 @@ pub enum Ended {
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum NewtonEnded {
-    /// It was not needed.
+    /// Newton's method was not needed.
     NotBegun,
-    /// The tolerance.
+    /// Newton's method reached the tolerance.
     Reached,
     /// The error no longer fell.
     Stalled,
-    /// A matrix was singular, or a step came to nothing.
+    /// A matrix was singular, or a step was blocked.
     Blocked,
 }
 
-/// A problem solved as far as it went.
+/// The best solution of a problem.
 ///
 /// ```
 /// # use drystone::contacts::{FreeBody, PointContact, Velocity};
@@ -105,23 +107,23 @@ pub enum NewtonEnded {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Outcome {
-    /// Impulses of the contacts, each in its coordinates (N s): the best there were.
+    /// The best impulses, each in the coordinates of its contact (N s).
     pub impulses: Vec<DVec3>,
-    /// Their error.
+    /// The error of the impulses.
     pub e_vel: f64,
-    /// Sweeps, before and after Newton's method.
+    /// Number of sweeps, before and after Newton's method.
     pub sweeps: u32,
-    /// Steps of Newton's method.
+    /// Number of Newton steps.
     pub steps: u32,
-    /// What ended the solve.
+    /// The reason why the solve ended.
     pub ended: Ended,
-    /// What ended Newton's method.
+    /// The reason why Newton's method ended.
     pub newton: NewtonEnded,
 }
 
 impl Outcome {
     fn keep(&mut self, impulses: &[DVec3], e_vel: f64) {
-        // The first error and every smaller one. A NaN is never smaller.
+        // Keep the first error and every smaller one. NaN never counts as smaller.
         if e_vel < self.e_vel {
             (self.e_vel, self.impulses) = (e_vel, impulses.to_vec());
         }
@@ -160,7 +162,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
         return best;
     }
 
-    // Sweeps for as long as they promise to be cheaper.
+    // Sweep while sweeps are expected to be cheaper.
     let mut errors = Vec::new();
     while best.e_vel > tolerance && sweeps.count < most {
         (0..STRIDE).for_each(|_| sweeps.advance(system));
@@ -169,7 +171,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
         if errors.len() < FIRST_STRIDES {
             continue;
         }
-        // At the rate of the last half of the sweeps.
+        // Estimate with the rate of the last half of the sweeps.
         let rate = (errors[errors.len() / 2] / best.e_vel).ln() / (0.5 * f64::from(sweeps.count));
         let left = (best.e_vel / tolerance).ln() / rate;
         let (step, sweep) = system.work();
@@ -189,7 +191,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
             best.ended = Ended::Newton;
             return best;
         }
-        // What is left are the last digits, which sweeps find.
+        // Sweeps find the last digits.
         if best.e_vel <= LAST_DIGITS * tolerance {
             break;
         }
@@ -205,7 +207,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
     best
 }
 
-/// Steps of Newton's method until something ends them.
+/// Runs Newton steps until a reason to end occurs.
 fn follow(interior: &mut Interior, system: &mut impl System, tolerance: f64, best: &mut Outcome) -> NewtonEnded {
     let (mut milestone, mut since) = (f64::INFINITY, 0);
     for _ in 0..MOST_STEPS {

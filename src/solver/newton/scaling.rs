@@ -1,30 +1,30 @@
-//! The cone of a contact for an interior point: |x_t| <= x_n, with products and scalings.
+//! The cone of a contact for an interior-point method: |x_t| <= x_n, with products and scalings.
 //!
-//! With T = diag(mu, 1, 1), x = T r and z = T⁻¹ û are both in this cone where r and û solve a contact problem. Without friction only
-//! the normal counts, and T is 1.
+//! Let T = diag(mu, 1, 1), x = T r and z = T⁻¹ û. If r and û solve a contact problem, x and z are both in this cone.
+//! Without friction only the normal counts, and T is 1.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use glam::{DMat3, DVec3};
 
-/// x o y = (x·y, x_n y_t + y_n x_t), the product that is zero where x and y are complementary.
+/// x o y = (x·y, x_n y_t + y_n x_t): this product is zero if x and y are complementary.
 pub(super) fn product(x: DVec3, y: DVec3) -> DVec3 {
     DVec3::new(x.dot(y), x.x * y.y + y.x * x.y, x.x * y.z + y.x * x.z)
 }
 
-/// The y of x o y = p.
+/// The y with x o y = p.
 pub(super) fn quotient(p: DVec3, x: DVec3) -> DVec3 {
     let normal = (x.x * p.x - x.y * p.y - x.z * p.z) / (x.x * x.x - x.y * x.y - x.z * x.z);
     DVec3::new(normal, (p.y - normal * x.y) / x.x, (p.z - normal * x.z) / x.x)
 }
 
-/// sqrt(x_n² - |x_t|²): 0 on the mantle.
+/// sqrt(x_n² - |x_t|²): 0 on the boundary.
 pub(super) fn depth(x: DVec3) -> f64 {
     let length = x.y.hypot(x.z);
     ((x.x - length) * (x.x + length)).max(0.0).sqrt()
 }
 
-/// The largest a such that x + a d is in the cone, of an x inside.
+/// The largest a for which x + a d is in the cone, for an x inside.
 pub(super) fn longest(x: DVec3, d: DVec3) -> f64 {
     let form = |x: DVec3, y: DVec3| x.x * y.x - x.y * y.y - x.z * y.z;
     let (a, b, c) = (form(d, d), form(x, d), form(x, x));
@@ -37,19 +37,19 @@ pub(super) fn longest(x: DVec3, d: DVec3) -> f64 {
     largest
 }
 
-/// The symmetric matrix S with S⁻¹ z = S x (Nesterov and Todd 1998), by its eigenvectors: sums of matrices would lose the small
-/// eigenvalues beside the large ones.
+/// The symmetric matrix S with S⁻¹ z = S x (Nesterov and Todd 1998), stored by eigenvectors: in a sum of matrices the
+/// small eigenvalues would be lost beside the large ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scaling {
     vectors: [DVec3; 3],
     /// Eigenvalues of S.
     values: [f64; 3],
-    /// How many of them count: one without friction.
+    /// Number of relevant eigenvalues: one without friction.
     count: usize,
 }
 
 impl Scaling {
-    /// Of an x and a z inside of the cone.
+    /// The scaling of an x and a z inside the cone.
     pub fn new(x: DVec3, z: DVec3, slides: bool) -> Self {
         if !slides {
             return Self { vectors: [DVec3::X, DVec3::Y, DVec3::Z], values: [(z.x / x.x).sqrt(), 0.0, 0.0], count: 1 };

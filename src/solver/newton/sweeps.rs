@@ -1,4 +1,4 @@
-//! Sweeps over a system, contact by contact and in f64 (docs/derivation.md, sections 4, 6 and 9).
+//! Sweeps over a system, contact by contact, in f64 (docs/derivation.md, sections 4, 6 and 9).
 
 use glam::{DVec2, DVec3};
 
@@ -8,14 +8,14 @@ use crate::config::Method;
 use crate::kernels::Momentum;
 use crate::kernels::momentum::StepLength;
 
-/// Impulses, with the velocities that they give.
+/// Impulses, and the velocities that follow from them.
 #[derive(Clone)]
 struct State {
     r: Vec<DVec3>,
     carried: Vec<f64>,
 }
 
-/// A problem while it is swept.
+/// The state of sweeps over a problem.
 ///
 /// ```
 /// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
@@ -31,17 +31,17 @@ struct State {
 /// ```
 pub struct Sweeps {
     method: Method,
-    /// After the last sweep, after the one before, and where the next begins.
+    /// The states after the last sweep, after the sweep before it, and at the start of the next.
     now: State,
     before: State,
     start: State,
     momentum: Momentum<f64>,
-    /// Sweeps so far.
+    /// Number of sweeps so far.
     pub count: u32,
 }
 
 impl Sweeps {
-    /// From some impulses, one a contact (N s).
+    /// Starts from given impulses, one for each contact (N s).
     pub fn new(system: &impl System, method: Method, r: Vec<DVec3>) -> Self {
         let state = State { carried: system.carried(&r), r };
         let mut momentum = Momentum::default();
@@ -49,7 +49,7 @@ impl Sweeps {
         Self { method, now: state.clone(), before: state.clone(), start: state, momentum, count: 0 }
     }
 
-    /// The impulses of the last sweep, each in its contact's coordinates (N s).
+    /// The impulses after the last sweep, each in its contact's coordinates (N s).
     pub fn impulses(&self) -> &[DVec3] {
         &self.now.r
     }
@@ -92,7 +92,7 @@ impl Sweeps {
             *start = *x + (*x - *before) * factor;
         }
         if factor == 0.0 {
-            // What rounding added up ends with the momentum.
+            // The accumulated rounding ends with the momentum.
             *carried = system.carried(r);
             return;
         }
@@ -102,7 +102,7 @@ impl Sweeps {
     }
 }
 
-/// The impulse r of a contact, corrected for its velocity u: the normal, then friction with the new normal.
+/// The corrected impulse of a contact with the velocity u: the normal first, then friction with the new normal.
 fn corrected(cone: &Cone, r: DVec3, u: DVec3) -> DVec3 {
     let own = cone.block.x_axis;
     let normal = (r.x - u.x / own.x).max(0.0);

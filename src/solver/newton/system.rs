@@ -1,11 +1,11 @@
-//! u = W r + q of a contact problem, in the form that sweeps and Newton's method need.
+//! u = W r + q of a contact problem, in the form for sweeps and Newton's method.
 
 use glam::{DMat3, DVec3};
 
 /// A contact problem as velocities that are linear in the impulses: u = W r + q.
 ///
-/// [`Self::factor`] and [`Self::solve`] are a direct solver of 1 + D W for any D in blocks; with an approximate D they precondition
-/// other methods.
+/// [`Self::factor`] and [`Self::solve`] are a direct solver of 1 + D W for any block diagonal D. With an approximate D
+/// they can precondition other methods.
 ///
 /// ```
 /// # use drystone::{contacts::LocalProblem, glam::{DMat3, DVec3}};
@@ -24,36 +24,37 @@ use glam::{DMat3, DVec3};
 /// assert_eq!(system.solve(&[DVec3::X * 4.0]), [DVec3::X]);
 /// ```
 pub trait System {
-    /// What each contact is by itself.
+    /// The data of each contact.
     fn cones(&self) -> &[Cone];
 
     /// The order in which sweeps visit the contacts.
     fn sequence(&self) -> &[u32];
 
-    /// The velocities that impulses `r` give the bodies: what [`Self::response`] needs besides `r`. Empty where W has blocks.
+    /// The velocities of the bodies under impulses `r`, which [`Self::response`] needs in addition to `r`. Empty if W
+    /// has blocks.
     fn carried(&self, r: &[DVec3]) -> Vec<f64>;
 
-    /// W r at a contact (m/s): u without q, since small changes of u would drown in q.
+    /// W r at a contact (m/s): u without q, because small changes of u would be lost in q.
     fn response(&self, contact: usize, r: &[DVec3], carried: &[f64]) -> DVec3;
 
-    /// Adds what a change of a contact's impulse does to `carried`.
+    /// Adds the effect of a change of a contact's impulse to `carried`.
     fn push(&self, contact: usize, change: DVec3, carried: &mut [f64]);
 
-    /// Multiplications of one [`Self::factor`], and of one sweep. Orders the elimination when it is first called.
+    /// Multiplications of one [`Self::factor`], and of one sweep. The first call computes the elimination order.
     fn work(&mut self) -> (f64, f64);
 
-    /// Factors 1 + D W with D in 3x3 blocks, one a contact (kg); none if a pivot is singular.
+    /// Factors 1 + D W with D in 3x3 blocks, one for each contact (kg). Returns `None` if a pivot is singular.
     fn factor(&mut self, d: &[DMat3]) -> Option<()>;
 
-    /// W x of (1 + D W) x = b, with the D that was factored last. x = b - D W x is left to the caller: D may be known in more digits
-    /// than its blocks hold.
+    /// W x with (1 + D W) x = b, for the last factored D. The caller computes x = b - D W x, because it can have D in
+    /// more digits than the blocks.
     ///
     /// # Panics
     /// Nothing was factored.
     fn solve(&self, b: &[DVec3]) -> Vec<DVec3>;
 }
 
-/// What one contact is by itself.
+/// The data of one contact.
 ///
 /// ```
 /// use drystone::{glam::{DMat3, DVec3}, solver::newton::Cone};
@@ -68,7 +69,7 @@ pub struct Cone {
     pub mu: f64,
     /// u without impulses (m/s).
     pub q: DVec3,
-    /// W_ii: how u answers to the contact's own impulse (1/kg).
+    /// W_ii: the response of u to the contact's own impulse (1/kg).
     pub block: DMat3,
     /// 3/trace(W_ii): the step of `e_vel` (kg).
     pub rho: f64,
@@ -77,7 +78,7 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// Of a friction coefficient, q and W_ii.
+    /// The data of a contact with this friction coefficient, q and W_ii.
     pub fn new(mu: f64, q: DVec3, block: DMat3) -> Self {
         let [[nn, _, _], [_, yy, yz], [_, zy, zz]] = block.to_cols_array_2d();
         let between = 0.5 * (yz + zy);

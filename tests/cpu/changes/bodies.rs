@@ -188,7 +188,7 @@ fn a_body_that_is_written_to_a_vacancy_is_refused_until_it_is_gone() {
         simulation.world.bodies[5] = cube(0.0, 30.0, 0.0).named("zombie");
         for _ in 0..2 {
             let line = simulation.step(DT).expect_err("a zombie").to_string();
-            assert_eq!(line, "body 5 \"zombie\": written to an index that is vacant: World::insert puts a body there");
+            assert_eq!(line, "body 5 \"zombie\": written to a vacant index: use World::insert to add a body");
             assert_eq!(simulation.world.check().expect_err("a zombie").to_string(), line);
         }
         simulation.world.bodies[5] = Body::fixed();

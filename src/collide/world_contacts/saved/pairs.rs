@@ -12,18 +12,18 @@ use crate::error::{Result, ensure, input};
 use crate::saved::{Archive, Columns, Saved};
 use crate::world::World;
 
-/// How a pair is written.
+/// The encoding of a pair.
 #[derive(Clone, Copy, Default)]
 struct Flags {
     is_swapped: bool,
     takes_part: bool,
-    /// Sizes and bodies are those of the colliders.
+    /// Sizes and bodies follow from the colliders.
     is_plain: bool,
-    /// The manifolds were computed at some time.
+    /// The manifolds were computed before.
     is_computed: bool,
-    /// The manifolds follow from the rest.
+    /// The manifolds can be recomputed from the rest.
     are_remade: bool,
-    /// How many manifolds there are; 3 for more than 2.
+    /// The number of manifolds; 3 for more than 2.
     manifolds: u8,
 }
 
@@ -46,7 +46,7 @@ const SECOND: usize = 2;
 const PREDICTED: usize = 3;
 const MANIFOLDS: usize = 4;
 
-/// A pair as it is written.
+/// The encoded form of a pair.
 #[derive(Default)]
 struct PairRecord {
     flags: Flags,
@@ -57,7 +57,8 @@ struct PairRecord {
 }
 
 impl PairRecord {
-    /// Writes or reads it. `last` is the first collider of the pair before, `base` guesses the distance up to which contacts are predicted.
+    /// Writes or reads it. `last` is the first collider of the pair before, and `base` is a guess of the prediction
+    /// distance.
     fn walk(&mut self, last: u32, base: [f32; 2], colliders: &[ColliderInfo], columns: &mut Columns) -> Result<()> {
         let Self { flags, key, predicted, manifolds } = self;
         flags.walk(columns)?;
@@ -89,12 +90,12 @@ impl PairRecord {
         let mut track = Track::of(&pair, colliders);
         (pair.takes_part, track.takes_part) = (self.flags.takes_part, f32::from(self.flags.takes_part));
         track.predicted = self.predicted;
-        // Such a manifold is written as it is, as those that do not follow for another reason are.
+        // Such a manifold is saved in full, like every other one that cannot be recomputed.
         pair.is_mended = !self.flags.are_remade;
         (pair, track)
     }
 
-    /// Whether its manifolds follow from the rest.
+    /// Whether its manifolds can be recomputed from the rest.
     fn is_remade(&self) -> bool {
         self.flags.are_remade && self.flags.is_plain && self.flags.is_computed
     }
@@ -178,7 +179,8 @@ impl WorldContacts {
         PairRecord { flags, key, predicted: track.predicted, manifolds: pair.manifolds.len() as u32 }
     }
 
-    /// The slots of the manifolds of some pairs, so many each: in their own order, in which those of one color stand in the order of the pairs.
+    /// The slots of the manifolds of some pairs; `counts` has the number of each. The saved order is the order of
+    /// slots, in which those of one color follow the order of the pairs.
     fn walk_slots<A: Archive>(&self, pairs: &[u32], counts: &[u32], archive: &mut A) -> Result<Vec<u32>> {
         let mut places: Vec<(u32, u32)> = Vec::new();
         if !A::READS {
@@ -211,7 +213,7 @@ impl WorldContacts {
     }
 }
 
-/// What a pair has of its colliders.
+/// The data that a pair copies from its colliders.
 struct PairRest {
     bodies: [u32; 2],
     size: f32,
@@ -233,7 +235,7 @@ impl PairRest {
     }
 }
 
-/// Whether a pair has of its colliders what it would have if it began now.
+/// Whether the copied data of a pair is the same as for a new pair.
 fn is_plain(pair: &Pair, track: &Track, plain: &Track) -> bool {
     let rest = |track: &Track| [track.size, track.reach_b, track.unbounded].map(f32::to_bits);
     track.bodies == plain.bodies

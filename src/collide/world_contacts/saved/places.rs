@@ -1,5 +1,5 @@
-//! Where bodies were when their pairs were computed. Several pairs of a body were computed in the same step, and where it was in another one is
-//! near that.
+//! The poses of bodies when their pairs were computed. Several pairs of a body were often computed in the same step,
+//! and its poses in different steps are near each other.
 
 use rayon::prelude::*;
 
@@ -8,20 +8,20 @@ use crate::error::{Result, input};
 use crate::saved::{Archive, Columns};
 use crate::world::{Body, World};
 
-/// The columns of places: which it is, the center, and two of the rotation.
+/// Column indices: which pose, the center, and two for the rotation.
 const WHICH: usize = 0;
 const CENTER: usize = 1;
 const ROTATION: usize = 4;
 
-/// Places of a body that are looked through for one that is there already.
+/// Number of poses of a body that are searched for an equal one.
 const MOST_PLACES: usize = 14;
 
-/// The sides of the pairs that were computed, body by body. Side `k` of pair `i` has the number `2 i + k`.
+/// The sides of the computed pairs, body by body. Side `k` of pair `i` has the number `2 i + k`.
 struct Sides {
-    /// Where those of each body begin, and where the last end.
+    /// The first entry of each body, and the end of the last one.
     begins: Vec<u32>,
     all: Vec<u32>,
-    /// The place of each side in `all`.
+    /// The index of each side in `all`.
     places: Vec<u32>,
 }
 
@@ -46,7 +46,7 @@ impl Sides {
     }
 }
 
-/// Writes where the bodies of all pairs were, or reads it.
+/// Writes or reads the poses of the bodies of all pairs.
 pub(super) fn walk_places_then<A: Archive>(
     pairs: &mut Pairs,
     bodies: usize,
@@ -82,8 +82,8 @@ pub(super) fn walk_places_then<A: Archive>(
     Ok(())
 }
 
-/// Writes or reads a place. The place is one of the body's `known` ones or joins them. 0 and 1 say that it is new, without and with its center
-/// in the origin; higher numbers, how far back it is.
+/// Writes or reads a pose. It is one of the `known` poses of the body, or joins them. 0 and 1 mark a new pose: with 1,
+/// the center is at the origin. Higher numbers count back to a known one.
 fn walk_place(place: &mut Placed, known: &mut Vec<Placed>, now: Option<&Body>, columns: &mut Columns) -> Result<()> {
     let is_same = |own: &Placed| bytemuck::bytes_of(own) == bytemuck::bytes_of(place);
     let back = known.iter().rev().take(MOST_PLACES).position(is_same);

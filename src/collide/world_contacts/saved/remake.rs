@@ -1,4 +1,4 @@
-//! Manifolds that are made again from where their bodies were.
+//! Recomputes manifolds from earlier poses of their bodies.
 
 use rayon::prelude::*;
 
@@ -12,11 +12,11 @@ use crate::collide::path::ANEW;
 use crate::error::{Result, ensure, input};
 use crate::lanes::InstructionSet;
 
-/// Pairs that one task makes again.
+/// Pairs that one task recomputes.
 const PAIRS_A_TASK: usize = 512;
 
 impl WorldContacts {
-    /// Whether the manifolds of a pair follow from the rest, where its colliders and all that follows from them are as they were.
+    /// Whether the manifolds of a pair can be recomputed, if its colliders and their data are unchanged.
     pub(super) fn is_remade(&self, i: usize) -> bool {
         let then = self.pairs.computed_at(i).filter(|_| self.pairs.with_track(i).1.predicted != ANEW);
         then.is_some_and(|then| then.iter().all(|place| place.is_centered == 1.0))
@@ -24,7 +24,7 @@ impl WorldContacts {
             && !self.pairs[i].is_mended
     }
 
-    /// Whether the manifolds of pairs come out with the same bits when they are made again.
+    /// Whether recomputed manifolds of pairs have the same bits.
     pub(super) fn are_same_again(&self, pairs: &[u32]) -> bool {
         pairs.par_chunks(PAIRS_A_TASK).all(|chunk| {
             let mut same = 0;
@@ -37,7 +37,8 @@ impl WorldContacts {
         })
     }
 
-    /// Makes the manifolds of these pairs again and gives them their slots, as many as each pair is to have.
+    /// Recomputes the manifolds of these pairs, and assigns their slots. `counts` has the number of manifolds of each
+    /// pair.
     pub(super) fn remake(&mut self, wanted: &[u32], counts: &[u32], mut slots: &[u32]) -> Result<()> {
         let can_be = |&i: &u32| {
             let (_, Track { predicted, then, .. }) = self.pairs.with_track(i as usize);
@@ -59,8 +60,8 @@ impl WorldContacts {
         Ok(())
     }
 
-    /// Makes the manifolds of pairs again where their bodies were, and calls `with` on the place of each in the chunk and on them; not on pairs
-    /// of cuboids that do not touch.
+    /// Recomputes the manifolds of pairs at the earlier poses, and calls `with` on the index of each pair in the chunk
+    /// and on its manifolds. Cuboid pairs that do not touch get no call.
     fn make_again(&self, chunk: &[u32], mut with: impl FnMut(usize, &mut Vec<Manifold>)) {
         let Some(&first) = chunk.first() else { return };
         let mut scratch = PairScratch::default();

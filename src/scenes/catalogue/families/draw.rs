@@ -1,4 +1,4 @@
-//! Numbers that a family draws.
+//! The random numbers of a family.
 
 use crate::random::SplitMix64;
 
@@ -8,7 +8,7 @@ const SEED_BITS: u32 = 54;
 pub(super) struct Draw(SplitMix64);
 
 impl Draw {
-    /// The numbers of a seed, others in each family.
+    /// The random numbers of a seed. They differ in each family.
     pub fn new(family: u64, seed: u64) -> Self {
         Self(SplitMix64::new(seed | family << SEED_BITS))
     }
@@ -18,7 +18,7 @@ impl Draw {
         least + (most - least) * 0.5 * (1.0 + self.0.symmetric())
     }
 
-    /// As likely in each power of two.
+    /// Log-uniform from `least` to `most`.
     pub fn log_uniform(&mut self, least: f64, most: f64) -> f64 {
         libm::exp(self.between(libm::log(least), libm::log(most)))
     }
@@ -38,7 +38,7 @@ impl Draw {
         self.between(0.0, std::f64::consts::TAU)
     }
 
-    /// Another seed, for a scene that draws its own numbers.
+    /// A new seed, for a scene that draws its own numbers.
     pub fn bits(&mut self) -> u64 {
         self.0.bits()
     }

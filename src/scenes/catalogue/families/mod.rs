@@ -1,4 +1,5 @@
-//! Families: random worlds, each with the law that statics or a closed form gives it. A family and a seed make one, the same everywhere.
+//! Families of random worlds. Statics or a closed form gives the law of each world. A family and a seed determine one
+//! world, the same on every machine.
 
 mod dominoes;
 mod draw;
@@ -12,7 +13,7 @@ use crate::error::{Result, input};
 use crate::names::named;
 use crate::scenes::scene::Scene;
 
-/// A kind of random worlds of which statics, or a closed form, says what holds.
+/// A family of random worlds whose outcome follows from statics or a closed form.
 ///
 /// ```
 /// use drystone::scenes::Family;
@@ -40,7 +41,7 @@ pub enum Family {
     Chains,
     /// A block on a slope near the angle of friction.
     Slopes,
-    /// A block that is pushed near the limit of friction.
+    /// A block that a force near the friction limit pushes.
     PushedBlocks,
     /// Piles of six shapes in a container.
     Piles,
@@ -73,11 +74,12 @@ named!(Family {
 pub enum Law {
     /// Every body keeps its place and is at rest at the end.
     Stands,
-    /// The body that can move stays where it is.
+    /// The movable body stays in place.
     Sticks,
-    /// The body that can move has this acceleration from the first step on (m/s²).
+    /// The movable body has this acceleration from the first step on (m/s²).
     Slides(DVec3),
-    /// The dynamic bodies fall one after another, in a wave of this speed (m/s), each as soon as it leans by `angle` (rad).
+    /// The dynamic bodies fall one after another in a wave of this speed (m/s). A body has fallen when it leans by
+    /// `angle` (rad).
     Topples {
         /// Speed of the wave (m/s).
         speed: f64,
@@ -86,9 +88,9 @@ pub enum Law {
     },
     /// Joints stay closed, and energy does not grow.
     Swings {
-        /// Length that a gap is held against (m).
+        /// Reference length for gaps (m).
         link: f64,
-        /// Energy that a gain is held against: what the bodies set free from upside down to hanging, halved (J).
+        /// Reference energy for gains: half of the energy that the bodies release between upside down and hanging (J).
         energy: f64,
     },
     /// No body leaves the container, and all come to rest.
@@ -112,13 +114,13 @@ pub struct Member {
     pub law: Law,
 }
 
-/// Gravity of the Earth (m/s²), which the factors of members multiply.
+/// Gravity of the Earth (m/s²). Members multiply it by a factor.
 const EARTH: f64 = 9.81;
-/// Time of a run under the gravity of the Earth (s).
+/// Duration of a run under the gravity of the Earth (s).
 const TIME: f64 = 10.0;
 
 impl Family {
-    /// One line: the worlds, and what holds of them.
+    /// One line: the worlds of the family, and their law.
     pub const fn summary(self) -> &'static str {
         match self {
             Self::Stacks => {
@@ -148,11 +150,11 @@ impl Family {
         }
     }
 
-    /// The world of a seed. A step takes 1/480 to 1/30 s, gravity is 0.1 to 10 times that of the Earth, and the run takes as many
-    /// times as long as a fall takes, 10 s under the gravity of the Earth.
+    /// The world of a seed. A step takes 1/480 to 1/30 s, gravity is 0.1 to 10 times that of the Earth, and the
+    /// duration of the run scales like that of a fall: 10 s under the gravity of the Earth.
     ///
     /// # Errors
-    /// None is known: drawn worlds can be simulated.
+    /// No error is known: every drawn world can be simulated.
     pub fn member(self, seed: u64) -> Result<Member> {
         let draw = &mut Draw::new(self as u64, seed);
         let dt = 1.0 / draw.log_uniform(30.0, 480.0);
@@ -170,7 +172,8 @@ impl Family {
             Self::PushedBlocks => moving::pushed(draw, g),
             Self::Piles => (moving::pile(draw)?, Law::Settles),
         };
-        // A wave of dominoes is seen in steps of a quarter of the time from one to the next, and of a longer step nothing says what holds.
+        // A domino wave needs steps of a quarter of the time from one domino to the next. The law says nothing for
+        // longer steps.
         let dt = if let Law::Topples { speed, .. } = law { dt.min(0.25 * dominoes::pitch(&scene) / speed) } else { dt };
         let time = match law {
             Law::Topples { speed, .. } => dominoes::time(&scene, speed, g),
@@ -187,7 +190,7 @@ impl Family {
         Ok(Member { scene, law })
     }
 
-    /// The world of a seed as commands and [`Scene::find_spec`] take it.
+    /// The world of a seed as a scene argument, for commands and [`Scene::find_spec`].
     ///
     /// ```
     /// # use drystone::{Scene, scenes::Family};
@@ -200,7 +203,7 @@ impl Family {
     }
 }
 
-/// The scene of a seed, of the family at an index.
+/// The world of a seed in the family at an index.
 pub(super) fn drawn(kind: usize, seed: u64) -> Result<Scene> {
     let family = Family::ALL.get(kind).ok_or_else(|| input!("kind = {kind}: must be below {}", Family::ALL.len()))?;
     Ok(family.member(seed)?.scene)
@@ -236,7 +239,8 @@ mod tests {
         }
     }
 
-    /// The draw is the same on every machine and in every version: these are hashes of the worlds of seed 1.
+    /// The worlds of a seed are the same on every machine and in every version. These are hashes of the worlds of seed
+    /// 1.
     #[test]
     fn the_worlds_of_a_seed_are_pinned() {
         let hash = |family: Family| {

@@ -10,16 +10,16 @@ use crate::scenes::catalogue::{basics, boxes, jointed};
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
-/// Shares of the limit of friction, of which the one holds a body and the other does not.
+/// Shares of the friction limit: friction holds a body at the first, but not at the second.
 const BELOW: f64 = 0.98;
 const ABOVE: f64 = 1.02;
 
-/// A chain that is lifted from where it hangs, or a net that swings down.
+/// A chain that is lifted from its hanging position, or a net that swings down.
 pub(super) fn chain(draw: &mut Draw, g: f64) -> (Scene, Law) {
     /// Length of a link, and distance of the balls of a net (m).
     const LINK: f64 = 0.5;
     let ratio = draw.log_uniform(1.0, 1000.0) as f32;
-    // How far below the joints that hold it a body may hang (m).
+    // How far a body can hang below the joints that hold it (m).
     let (scene, reach): (_, fn(&Body) -> f64) = if draw.is_heads() {
         let links = draw.whole(3, 60);
         (jointed::chain(links, ratio, draw.between(0.0, 90.0) as f32), |body| body.position.length().into())
@@ -30,7 +30,7 @@ pub(super) fn chain(draw: &mut Draw, g: f64) -> (Scene, Law) {
     (scene, Law::Swings { link: LINK, energy })
 }
 
-/// A box or a cylinder on its base, so flat that friction does not topple it, and the half of its height (m).
+/// A box or a cylinder on its base, so flat that friction does not topple it, and half of its height (m).
 fn block(draw: &mut Draw) -> (Body, f64) {
     let half_width = draw.log_uniform(0.05, 0.5);
     let half_height = half_width * draw.between(0.1, 0.7);
@@ -43,7 +43,7 @@ fn block(draw: &mut Draw) -> (Body, f64) {
     (Body::dynamic().shape(shape).density(draw.log_uniform(100.0, 10_000.0) as f32), half_height)
 }
 
-/// A block on a slope: it stays where tan(angle) < mu, and slides with g (sin(angle) - mu cos(angle)) where not.
+/// A block on a slope: it stays if tan(angle) < mu, else it slides with g (sin(angle) - mu cos(angle)).
 pub(super) fn slope(draw: &mut Draw, g: f64) -> (Scene, Law) {
     let mu = draw.between(0.1, 1.0);
     let (body, half_height) = block(draw);
@@ -57,8 +57,8 @@ pub(super) fn slope(draw: &mut Draw, g: f64) -> (Scene, Law) {
     (scene, law)
 }
 
-/// A block on level ground that a constant force through its middle pushes: it stays where the force is below mu m g, and else slides with the
-/// rest of the force.
+/// A block on level ground with a constant horizontal force through its center: it stays if the force is below mu m g,
+/// else the rest of the force accelerates it.
 pub(super) fn pushed(draw: &mut Draw, g: f64) -> (Scene, Law) {
     let mu = draw.between(0.1, 1.0);
     let (body, half_height) = block(draw);

@@ -1,4 +1,4 @@
-//! Families that stand, because statics says so.
+//! Families that stand, by statics.
 
 use glam::Vec3;
 
@@ -10,10 +10,10 @@ use crate::scenes::catalogue::masonry;
 use crate::scenes::scene::Scene;
 use crate::world::{Body, Shape, World};
 
-/// Share of a face, about its middle, that loads stay on: 10 % of its width is left at each edge.
+/// Loads stay within this share of a face about its center: 10 % of its width is left at each edge.
 const MIDDLE: f64 = 0.8;
 
-/// A floor that no structure here can fall off.
+/// A floor that is large enough for every structure here.
 fn ground(friction: f64) -> World {
     let mut world = floor(100.0, 100.0);
     world.bodies[0].material.friction = friction as f32;
@@ -24,26 +24,27 @@ fn ground(friction: f64) -> World {
 struct Block {
     /// Half extents (m).
     half: [f64; 3],
-    /// Place of its middle along x and z (m).
+    /// Position of its center along x and z (m).
     place: [f64; 2],
-    /// Turn about the vertical (rad).
+    /// Rotation about the vertical (rad).
     turn: f64,
 }
 
 impl Block {
-    /// Whether a place along x and z is above the middle of its face.
+    /// Whether a point at x and z is above the middle part of its face.
     fn bears(&self, place: [f64; 2]) -> bool {
         let [x, z] = [place[0] - self.place[0], place[1] - self.place[1]];
         let (sin, cos) = libm::sincos(self.turn);
-        // The axes of the face: x turns to -z.
+        // The axes of the face: x rotates to -z.
         let [along, across] = [x * cos - z * sin, x * sin + z * cos];
         along.abs() <= MIDDLE * self.half[0] && across.abs() <= MIDDLE * self.half[2]
     }
 }
 
-/// Boxes on top of each other, dropped from gaps of up to 0.2 % of their heights. The center of mass of every box is above the middle of
-/// each face below it. A face is convex, so that the center of mass of any boxes together is above it, too: of all above, which is what
-/// statics asks of a stack at rest, and of a box that lands on those that lie already.
+/// Boxes on top of each other, dropped through gaps of up to 0.2 % of their heights. The center of mass of every box is
+/// above the middle part of every face below it. A face is convex, so the center of mass of any group of these boxes is
+/// above it too. Statics asks this of the group above each face, both for a stack at rest and for a box that lands on
+/// boxes that already rest.
 pub(super) fn stack(draw: &mut Draw) -> Scene {
     let n = draw.whole(4, 40);
     let size = draw.log_uniform(0.1, 1.0);
@@ -51,7 +52,8 @@ pub(super) fn stack(draw: &mut Draw) -> Scene {
     let gap = draw.between(0.0, 0.002);
     let reach = draw.between(0.0, 0.5) * size;
     let density = densities(draw, n);
-    // From the top down: a box that does not bear those above is drawn again. One of the largest, on the axis, bears all.
+    // From the top down: a box that does not support the boxes above is drawn again. A box of the largest size on the
+    // axis supports all of them.
     let mut blocks: Vec<Block> = Vec::new();
     while blocks.len() < n {
         let half = [(0.6, 1.0), (0.2, 0.6), (0.6, 1.0)].map(|(least, most)| 0.5 * size * draw.between(least, most));
@@ -73,7 +75,8 @@ pub(super) fn stack(draw: &mut Draw) -> Scene {
     Scene::new("stacks", world, 0)
 }
 
-/// Densities of `n` boxes, the lowest first (kg/m³): equal, heavy on light, light and heavy in turn, or random, up to 1000 times each other.
+/// Densities of `n` boxes, the lowest first (kg/m³): equal, heavy on light, alternating, or random, with a ratio of up
+/// to 1000.
 fn densities(draw: &mut Draw, n: usize) -> Vec<f64> {
     const LIGHT: f64 = 100.0;
     let ratio = draw.log_uniform(1.0, 1000.0);
@@ -85,8 +88,8 @@ fn densities(draw: &mut Draw, n: usize) -> Vec<f64> {
     }
 }
 
-/// Equal boxes, each further out than the one below by the same shift. The center of mass of the k above a box is (k + 1)/2 shifts out,
-/// half a width at most: with n boxes the shift may be a width over n.
+/// Equal boxes, each shifted by the same amount relative to the one below. The center of mass of the k boxes above a
+/// box is (k + 1)/2 shifts out, and has to stay within half a width: with n boxes the shift can be a width over n.
 pub(super) fn leaned(draw: &mut Draw) -> Scene {
     const SHARE: f64 = 0.8;
     let n = draw.whole(2, 30);
@@ -106,16 +109,17 @@ pub(super) fn leaned(draw: &mut Draw) -> Scene {
     Scene::new("leaned-towers", world, 0)
 }
 
-/// Semicircles of wedges. The least thickness is 0.1074 of the radius, where friction is above 0.3958 (Cocchetti and Rizzi, "Analytical and
-/// numerical analysis on the collapse modes of least-thickness circular masonry arches at decreasing friction", 2020, table 3). With joints at
-/// some angles only, an arch may be thinner.
+/// Semicircles of wedges. The smallest thickness is 0.1074 of the radius if friction is above 0.3958 (Cocchetti and
+/// Rizzi, "Analytical and numerical analysis on the collapse modes of least-thickness circular masonry arches at
+/// decreasing friction", 2020, table 3). An arch with joints at only some angles can be thinner.
 pub(super) fn arch(draw: &mut Draw) -> Result<Scene> {
     const LEAST: f64 = 0.107426;
     let voussoirs = draw.whole(7, 31);
     masonry::arch_of(voussoirs, LEAST * draw.between(1.1, 2.0), draw.between(0.5, 1.0) as f32)
 }
 
-/// Cards that lean by an angle press their feet apart by at most tan(angle) of their load, and less if they are thick.
+/// Cards that lean at an angle push their feet apart with at most tan(angle) of their load, and with less if they are
+/// thick.
 pub(super) fn card_house(draw: &mut Draw) -> Scene {
     let storeys = draw.whole(1, 5);
     let degrees = draw.between(10.0, 30.0);
@@ -124,12 +128,12 @@ pub(super) fn card_house(draw: &mut Draw) -> Scene {
     masonry::card_house(storeys, degrees, friction as f32, length, length * draw.log_uniform(0.005, 0.04))
 }
 
-/// Planks on end and planks across, all of whose crossings are straight above each other.
+/// Planks on end and planks across. Their crossings are straight above each other.
 pub(super) fn plank_tower(draw: &mut Draw) -> Scene {
     let storeys = draw.whole(1, 8);
     let half_length = draw.log_uniform(0.05, 0.6);
     let [thin, wide] = [draw.between(0.05, 0.15), draw.between(0.15, 0.3)].map(|share| (half_length * share) as f32);
-    // Those across end over the middle of those on end at most, and two beside each other do not touch.
+    // The planks across end at most over the middle of the planks on end, and two side by side do not touch.
     let pitch = half_length * draw.between(0.7, 0.92);
     let friction = draw.between(0.2, 1.0) as f32;
     let mut scene = masonry::planks("plank-towers", storeys, Vec3::new(thin, wide, half_length as f32), pitch);
@@ -144,7 +148,8 @@ mod tests {
     use super::super::Family;
     use super::*;
 
-    /// How far inside of the face of a box, as a share of its half width, the center of mass of bodies above is; least over both axes.
+    /// Distance of the center of mass of some bodies from the edge of a box face, as a share of the half width; the
+    /// smaller of both axes.
     fn inside(face: &Body, above: &[Body]) -> f64 {
         let mass: f64 = above.iter().map(|b| f64::from(b.mass.mass)).sum();
         let center = above.iter().map(|b| f64::from(b.mass.mass) * b.position.as_dvec3()).sum::<DVec3>() / mass;
@@ -153,7 +158,7 @@ mod tests {
         (1.0 - own.x.abs() / half.x).min(1.0 - own.z.abs() / half.z)
     }
 
-    /// Statics anew, from the bodies as they are.
+    /// Checks statics again, from the positions of the bodies.
     #[test]
     fn all_above_a_box_of_a_stack_bears_on_its_middle_and_on_that_of_the_next() {
         for seed in 0..50 {
