@@ -5,6 +5,7 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
+use super::solid::magnification;
 use crate::math::rotation::squared_length;
 use crate::world::{Body, BodyKind, Collider, Shape, placed};
 
@@ -139,12 +140,15 @@ pub(super) struct CuboidPlace {
     pub rest_of_place: f32,
     /// Half extents (m).
     pub half: Vec3,
-    pub rest: [f32; 5],
+    /// Stands for a distance of zero between faces (m): 2^-50 of the smallest half extent, as a power of two.
+    pub least: f32,
+    pub rest: [f32; 4],
 }
 
 impl CuboidPlace {
     pub fn new(half: Vec3, position: Vec3, rotation: Quat) -> Self {
-        Self { rotation, position, half, ..Self::default() }
+        let least = 2.0_f32.powi(-50) / magnification(half.min_element());
+        Self { rotation, position, half, least, ..Self::default() }
     }
 
     /// The row of a collider; zero if it is not a cuboid.

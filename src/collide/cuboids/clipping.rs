@@ -9,7 +9,7 @@ use parry3d::shape::{Cuboid, PolygonalFeature};
 
 use super::super::lane_pose::{Pose, Turn, backwards, magnitude, negative};
 use super::super::solid::ParryManifold;
-use super::{Near, is_small};
+use super::Near;
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Vec3, cross3, dot3, vec3};
 
@@ -66,8 +66,6 @@ struct Face<L> {
 #[inline(always)]
 fn clip<L: Lanes>(pose: Pose<L>, normal: Vec3<L>, half: [Vec3<L>; 2], clipped: &mut Clipped) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    // Parry treats sides as parallel if the squared area of their parallelogram is at most this.
-    let flat = L::select(L::constant(f64::from(f32::EPSILON)), zero, is_small(half[0], half[1]));
     let turn = Turn::of(pose.rotation);
     let back = Turn::of(backwards(pose.rotation)).of_vector(negative(normal));
     // Parry's basis of the plane.
@@ -113,7 +111,7 @@ fn clip<L: Lanes>(pose: Pose<L>, normal: Vec3<L>, half: [Vec3<L>; 2], clipped: &
             let s = (b * f - c * e).divided_by(denominator);
             let t = (b * s + f).divided_by(e);
             // Not parallel, by more than four floats.
-            let is_crossing = L::and(denominator.gt(flat), ae.floats_below(4).gt(bb));
+            let is_crossing = L::and(denominator.gt(zero), ae.floats_below(4).gt(bb));
             let is_within = L::and(L::and(s.gt(zero), one.gt(s)), L::and(t.gt(zero), one.gt(t)));
             touching = touching + L::select(zero, L::constant(bit), L::and(is_crossing, is_within));
             bit *= 2.0;

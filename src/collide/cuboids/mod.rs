@@ -1,6 +1,6 @@
 //! The contacts of cuboids, sixteen pairs at a time, bit for bit equal to parry's `contact_manifold_cuboid_cuboid` for
-//! each pair. A pair with a half extent below [`SMALL`] gets parry's result for an enlarged pair, because parry's
-//! tolerances are absolute lengths.
+//! each pair, if parry sees the pair enlarged by 2^27 or more: beside so large a pair its tolerances, which are absolute
+//! lengths, are nothing.
 //!
 //! Parry tests the three face normals of each cuboid and the nine cross products of edges, and takes the direction
 //! along which the cuboids are furthest apart. Then it clips the two faces that are most perpendicular to that
@@ -19,9 +19,8 @@ use std::sync::Mutex;
 use self::clipping::{Clipped, Clipping};
 use self::separation::Separation;
 use super::collider::{BodyState, CuboidPlace};
-use super::solid::{ParryManifold, SMALL};
-use crate::lanes::{InstructionSet, Lanes, Row8, WIDTH};
-use crate::math::Vec3;
+use super::solid::ParryManifold;
+use crate::lanes::{InstructionSet, Row8, WIDTH};
 
 /// Two cuboids to test.
 #[derive(Clone, Copy)]
@@ -77,12 +76,4 @@ pub(super) fn cuboid_contacts(
             with(near.number, &|found| clipped.write(lane, near, found));
         }
     }
-}
-
-/// Whether the thinner of two cuboids with these half extents is thin enough for parry's tolerances to matter.
-#[inline(always)]
-fn is_small<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>) -> L::Mask {
-    let thickness_1 = L::smaller(L::smaller(half_1.x, half_1.y), half_1.z);
-    let thickness_2 = L::smaller(L::smaller(half_2.x, half_2.y), half_2.z);
-    L::constant(f64::from(SMALL)).gt(L::smaller(thickness_1, thickness_2))
 }

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use super::super::collider::{BodyState, CuboidPlace, POSE, POSITION};
 use super::super::lane_pose::{Pose, Turn, backwards, choose, corner, length, negative};
-use super::{CuboidPair, Near, is_small};
+use super::{CuboidPair, Near};
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
 use crate::math::{Quat, Vec3, dot3, vec3};
 
@@ -32,10 +32,10 @@ impl Work for Separation<'_> {
                 }
                 prediction.0[lane] = pair.prediction;
             }
-            let (pose_1, half_1) = self.side::<L>(&bodies[0], &cuboids[0]);
-            let (pose_2, half_2) = self.side::<L>(&bodies[1], &cuboids[1]);
+            let (pose_1, half_1, least_1) = self.side::<L>(&bodies[0], &cuboids[0]);
+            let (pose_2, half_2, least_2) = self.side::<L>(&bodies[1], &cuboids[1]);
             let pose = pose_1.sees(pose_2);
-            let (distance, direction) = separation(half_1, half_2, pose);
+            let (distance, direction) = separation(half_1, half_2, pose, L::smaller(least_1, least_2));
             let is_apart = L::select(L::constant(0.0), L::constant(1.0), distance.gt(L::load(&prediction))).store();
             let (q, at) = (pose.rotation, pose.at);
             let poses = L::scattered([q.axis.x, q.axis.y, q.axis.z, q.w, at.x, at.y, at.z, half_2.z]);
@@ -56,23 +56,23 @@ impl Work for Separation<'_> {
 }
 
 impl Separation<'_> {
-    /// Poses and half extents of the cuboids.
+    /// Poses, half extents and least distances of the cuboids.
     #[inline(always)]
-    fn side<L: Lanes>(&self, bodies: &[u32; WIDTH], cuboids: &[u32; WIDTH]) -> (Pose<L>, Vec3<L>) {
+    fn side<L: Lanes>(&self, bodies: &[u32; WIDTH], cuboids: &[u32; WIDTH]) -> (Pose<L>, Vec3<L>, L) {
         let q = columns::<L, _>(self.bodies, POSE, bodies);
         let at = columns::<L, _>(self.bodies, POSITION, bodies);
         let local = columns::<L, _>(self.cuboids, 0, cuboids);
         let half = columns::<L, _>(self.cuboids, 1, cuboids);
         let body = Pose { rotation: Quat { axis: vec3(q[0], q[1], q[2]), w: q[3] }, at: vec3(at[0], at[1], at[2]) };
-        (body.after(Pose::of(local)), vec3(half[0], half[1], half[2]))
+        (body.after(Pose::of(local)), vec3(half[0], half[1], half[2]), half[3])
     }
 }
 
 /// The largest distance of two cuboids over parry's directions, and its direction.
 #[inline(always)]
-fn separation<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L, Vec3<L>) {
-    let (distance_1, direction_1) = across_faces(half_1, half_2, pose);
-    let (distance_2, direction_2) = across_faces(half_2, half_1, pose.inverse());
+fn separation<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>, least: L) -> (L, Vec3<L>) {
+    let (distance_1, direction_1) = across_faces(half_1, half_2, pose, least);
+    let (distance_2, direction_2) = across_faces(half_2, half_1, pose.inverse(), least);
     let (distance_3, direction_3) = across_edges(half_1, half_2, pose);
     let from_2 = Turn::of(pose.rotation).of_vector(negative(direction_2));
     // Pick the best direction, and the first one in parry's order if two are equal.
@@ -83,15 +83,13 @@ fn separation<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L, 
 }
 
 /// The distance across the best face of the first cuboid. If the second lies beyond several faces, the direction is
-/// between their normals.
+/// between their normals; `least` stands there for a distance of zero.
 #[inline(always)]
-fn across_faces<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L, Vec3<L>) {
+fn across_faces<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>, least: L) -> (L, Vec3<L>) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let (turn, back) = (Turn::of(pose.rotation), Turn::of(backwards(pose.rotation)));
     let place = [pose.at.x, pose.at.y, pose.at.z];
     let half = [half_1.x, half_1.y, half_1.z];
-    // Replaces a distance of zero: parry's length, or for small cuboids one whose square is just above underflow.
-    let least = L::select(L::constant(f64::from(f32::EPSILON)), L::constant(1e-15), is_small(half_1, half_2));
     let mut best = (L::constant(f64::from(f32::MIN)), vec3(zero, zero, zero));
     let (mut sum, mut beyond) = ([zero; 3], zero);
     for i in 0..3 {

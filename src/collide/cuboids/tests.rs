@@ -24,25 +24,25 @@ impl Random {
     }
 }
 
-/// Two cuboids about as far apart as they touch. Some have the same size, or, unless they are `uneven`, sizes and distances that are round
-/// numbers, so that directions are as good as others and corners lie on sides.
-fn two(random: &mut Random, nearly_parallel: bool, uneven: bool) -> ([BodyState; 2], [CuboidPlace; 2]) {
+/// Two cuboids about as far apart as they touch. Some have the same size, or sizes and distances that are round numbers, so that directions
+/// are as good as others and corners lie on sides.
+fn two(random: &mut Random, nearly_parallel: bool) -> ([BodyState; 2], [CuboidPlace; 2]) {
     let size = |random: &mut Random| {
         let any = Vec3::splat(1.05) + random.vector();
-        if random.next() > 0.0 || uneven { any } else { (any * 4.0).ceil() * 0.25 }
+        if random.next() > 0.0 { any } else { (any * 4.0).ceil() * 0.25 }
     };
     let half = if random.next() > 0.0 { [size(random); 2] } else { [size(random), size(random)] };
     let base = if random.next() > 0.5 { Quat::IDENTITY } else { random.rotation() };
     let (rotation, mut between) = if nearly_parallel {
         let axis = Vec3::AXES[(3.0 * (0.5 + 0.499 * random.next())) as usize];
         let across = random.vector() * (half[0] + half[1]) * (Vec3::ONE - axis);
-        let gap = 0.02 * random.next() * if random.next() > -0.5 || uneven { 1.0 } else { 0.0 };
+        let gap = 0.02 * random.next() * if random.next() > -0.5 { 1.0 } else { 0.0 };
         let signed = axis * random.next().signum();
         (random.nearly_right(), across + signed * ((half[0] + half[1]).dot(axis) + gap))
     } else {
         (random.rotation(), random.vector() * (half[0].length() + half[1].length()))
     };
-    if random.next() > 0.7 && !uneven {
+    if random.next() > 0.7 {
         between = (between * 8.0).round() * 0.125;
     }
     let at = 5.0 * random.vector();
@@ -53,20 +53,19 @@ fn two(random: &mut Random, nearly_parallel: bool, uneven: bool) -> ([BodyState;
     (bodies, places)
 }
 
-/// Compares `count` pairs with parry, bit by bit; returns how many touch. Where they are `smaller`, a power of two, parry sees pairs so large that
-/// its tolerances are nothing beside them.
+/// Compares `count` pairs with parry, bit by bit; returns how many touch. They are `smaller`, a power of two, than those of [`two`]; parry
+/// sees each so large that its tolerances are nothing beside it.
 fn compare(set: InstructionSet, count: u32, nearly_parallel: bool, smaller: f32) -> usize {
-    let larger = if smaller > 1.0 { 256.0 * smaller } else { 1.0 };
     let mut random = Random(if nearly_parallel { 1 << 40 } else { 1 << 41 });
     let (mut scratch, mut touching, mut points) = (CuboidScratch::default(), 0, 0);
     for batch in 0..count.div_ceil(1000) {
         let (mut bodies, mut cuboids, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
         for number in 0..1000 {
-            let (mut two, mut places) = two(&mut random, nearly_parallel, smaller > 1.0);
+            let (mut two, mut places) = two(&mut random, nearly_parallel);
             two.iter_mut().for_each(|body| body.position /= smaller);
-            places
-                .iter_mut()
-                .for_each(|place| (place.position, place.half) = (place.position / smaller, place.half / smaller));
+            places.iter_mut().for_each(|place| {
+                *place = CuboidPlace::new(place.half / smaller, place.position / smaller, place.rotation)
+            });
             bodies.extend(two);
             cuboids.extend(places);
             let ids = [2 * number, 2 * number + 1];
@@ -81,6 +80,8 @@ fn compare(set: InstructionSet, count: u32, nearly_parallel: bool, smaller: f32)
         });
         for pair in &pairs {
             let [a, b] = pair.bodies.map(|i| i as usize);
+            // Parry puts this length in place of a distance of zero.
+            let larger = f32::EPSILON / cuboids[a].least.min(cuboids[b].least);
             let pose = |i: usize| {
                 let body = Pose::from_parts(larger * bodies[i].position, bodies[i].rotation);
                 body * Pose::from_parts(larger * cuboids[i].position, cuboids[i].rotation)
