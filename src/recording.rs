@@ -79,7 +79,7 @@ pub struct Recorder<W: Write> {
 /// The first bytes of a recording.
 const MAGIC: [u8; 8] = *b"drystrec";
 /// The version of what follows them. It grows with every change of what is recorded.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Bytes before a part: its kind, its length and its hash.
 const PART: usize = 1 + 8 + 8;
 

@@ -273,12 +273,18 @@ impl Simulation {
         if !self.begin_step(dt, &mut stats)? {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
-        use Kernel::{BeginChanges, EndChanges, IntegrateGyroscopic, IntegrateTorques, IntegrateVelocities};
+        use Kernel::{
+            BeginChanges, DampVelocities, EndChanges, IntegrateGyroscopic, IntegrateTorques, IntegrateVelocities,
+        };
         let forces = |p: &&Pass| {
             let Pass { kernel, .. } = p;
             matches!(
                 kernel,
-                BeginChanges | IntegrateVelocities { .. } | IntegrateTorques { .. } | IntegrateGyroscopic { .. }
+                BeginChanges
+                    | IntegrateVelocities { .. }
+                    | IntegrateTorques { .. }
+                    | DampVelocities { .. }
+                    | IntegrateGyroscopic { .. }
             )
         };
         let blocks = self.stages.plan.passes.chunk_by(|p, q| p.block == q.block);

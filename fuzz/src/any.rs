@@ -171,6 +171,7 @@ pub struct AnyBody {
     mass: Option<AnyMass>,
     groups: Option<(u8, u8)>,
     gravity_scale: Option<Number>,
+    damping: Option<(Number, Number)>,
 }
 
 #[derive(Arbitrary, Clone, Copy, Debug)]
@@ -226,6 +227,9 @@ impl AnyBody {
         }
         if let Some(scale) = self.gravity_scale {
             body = body.gravity_scale(scale.0);
+        }
+        if let Some((linear, angular)) = self.damping {
+            body = body.linear_damping(linear.0).angular_damping(angular.0);
         }
         body
     }

@@ -2,7 +2,7 @@
 //!
 //! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm stands here
 //! and nowhere else. A plan has no pass for a feature that its scene lacks: without friction no kernel has friction, and without
-//! restitution, torques, unequal moments of inertia or joints there are no passes for these.
+//! restitution, torques, damping, unequal moments of inertia or joints there are no passes for these.
 
 mod bytes;
 mod kernel;
@@ -83,12 +83,23 @@ pub(crate) struct PlanKey {
     /// Whether the bodies of each block have equal moments of inertia: joints lend some inertia from step to step.
     isotropic: Vec<bool>,
     has_torques: bool,
+    has_dampings: bool,
     /// Whether joints have axes, and whether any is a limit or a drive.
     axes: bool,
     swept_axes: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes, swept_axes });
+crate::saved::cloned!(PlanKey {
+    colors,
+    blocks,
+    totals,
+    joint_totals,
+    isotropic,
+    has_torques,
+    has_dampings,
+    axes,
+    swept_axes
+});
 
 impl PlanKey {
     /// Whether it is that of the plan of a problem.
@@ -96,6 +107,7 @@ impl PlanKey {
         self.blocks == problem.blocks
             && self.colors == problem.colors
             && self.has_torques != problem.torques.is_empty()
+            && self.has_dampings != problem.dampings.is_empty()
             && self.totals != problem.totals.is_empty()
             && self.joint_totals != problem.joint_totals.is_empty()
             && self.axes != problem.axes.is_empty()
@@ -113,6 +125,7 @@ impl PlanKey {
             joint_totals: !problem.joint_totals.is_empty(),
             isotropic,
             has_torques: !problem.torques.is_empty(),
+            has_dampings: !problem.dampings.is_empty(),
             axes: !problem.axes.is_empty(),
             swept_axes: problem.has_swept_axes(),
         }
@@ -221,6 +234,9 @@ impl StepPlan {
             self.over_colors(Kernel::IntegrateVelocities { warm_start, from_start }, block, bodies);
             if !problem.torques.is_empty() {
                 self.over_colors(Kernel::IntegrateTorques { from_start }, block, bodies);
+            }
+            if !problem.dampings.is_empty() {
+                self.over_colors(Kernel::DampVelocities { from_start }, block, bodies);
             }
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);

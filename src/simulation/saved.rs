@@ -47,7 +47,7 @@ impl Snapshot {
 /// The first bytes of a saved run.
 const MAGIC: [u8; 8] = *b"drystone";
 /// The version of the bytes that follow them. It grows with every change of what is saved.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Bytes before the content: the magic, the version, and the hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 

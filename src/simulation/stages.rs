@@ -333,6 +333,7 @@ impl Stages {
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
+            problem::write_dampings(world, sleep.asleep(), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
             if found.computed > 0 || found.reshaped || !is_planned {
                 let swept = ContactSummary::of(problem);

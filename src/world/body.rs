@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::groups::Groups;
-use super::limits::{MOST_GRAVITY, MOST_SPEED, check_place, check_rotation, is_within};
+use super::limits::{MOST_DAMPING, MOST_GRAVITY, MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::Shape;
 use crate::error::{Result, ensure, input};
@@ -166,6 +166,11 @@ pub struct Body {
     pub torque: Vec3,
     /// The share of its world's gravity that the body feels: 1 unless set, 0 floats, -1 rises as fast as others fall. Of dynamic bodies.
     pub gravity_scale: f32,
+    /// The rate at which the linear velocity decays (1/s), 0 or more: without forces it is v exp(-d t) after the time t, for any number of
+    /// substeps, and a body that falls comes to the speed g/d. Of dynamic bodies; 0 unless set.
+    pub linear_damping: f32,
+    /// The rate at which the angular velocity decays (1/s), 0 or more, likewise.
+    pub angular_damping: f32,
     /// Mass, center of mass and inertia; zero unless dynamic. They do not follow [`Self::colliders`] or [`Self::kind`] where
     /// those are changed later: [`Self::update_mass`] makes them anew. A simulation raises moments of inertia that are
     /// less than a 32nd of the mass times the square of the lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
@@ -194,6 +199,8 @@ crate::saved::cloned!(Body {
     force,
     torque,
     gravity_scale,
+    linear_damping,
+    angular_damping,
     mass,
     material,
     groups,
@@ -265,6 +272,8 @@ impl Body {
             force,
             torque,
             gravity_scale,
+            linear_damping,
+            angular_damping,
             mass,
             material,
             groups,
@@ -280,6 +289,8 @@ impl Body {
             load.walk(archive)?;
         }
         gravity_scale.walk(archive)?;
+        linear_damping.walk(archive)?;
+        angular_damping.walk(archive)?;
         mass.walk(archive)?;
         material.walk(archive)?;
         groups.walk(archive)?;
@@ -300,6 +311,8 @@ impl Body {
             force: Vec3::ZERO,
             torque: Vec3::ZERO,
             gravity_scale: 1.0,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
             mass: MassProperties::IMMOVABLE,
             material: Material::default(),
             groups: Groups::ALL,
@@ -442,6 +455,31 @@ impl Body {
         self
     }
 
+    /// The rate at which its linear velocity decays (1/s), 0 or more: [`Body::linear_damping`](Self::linear_damping).
+    ///
+    /// ```
+    /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    /// let ball = Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X, Vec3::Y).linear_damping(2.0).angular_damping(1.0);
+    /// let ball = world.insert(ball);
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.step(0.5)?;
+    /// let ball = simulation.world.body(ball).expect("still there");
+    /// assert!((ball.linear_velocity.x - (-1.0_f32).exp()).abs() < 1e-6);
+    /// assert!((ball.angular_velocity.y - (-0.5_f32).exp()).abs() < 1e-6);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn linear_damping(mut self, rate: f32) -> Self {
+        self.linear_damping = rate;
+        self
+    }
+
+    /// The rate at which its angular velocity decays (1/s), 0 or more.
+    pub fn angular_damping(mut self, rate: f32) -> Self {
+        self.angular_damping = rate;
+        self
+    }
+
     /// Coulomb coefficient.
     pub fn friction(mut self, friction: f32) -> Self {
         self.material.friction = friction;
@@ -537,6 +575,8 @@ impl Body {
             force: _,
             torque: _,
             gravity_scale,
+            linear_damping,
+            angular_damping,
             mass,
             material,
             groups,
@@ -547,6 +587,7 @@ impl Body {
             applied_torque: _,
         } = self;
         (name, kind, mass, gravity_scale) == (&other.name, &other.kind, &other.mass, &other.gravity_scale)
+            && (linear_damping, angular_damping) == (&other.linear_damping, &other.angular_damping)
             && (material, groups, swept, weight) == (&other.material, &other.groups, &other.swept, &other.weight)
             && self.has_same_colliders(other)
     }
@@ -558,6 +599,11 @@ impl Body {
             shape.is(&b.shape) && (position, rotation, sensor) == (&b.position, &b.rotation, &b.sensor)
         };
         self.colliders.len() == other.colliders.len() && self.colliders.iter().zip(&other.colliders).all(same)
+    }
+
+    /// Whether its motion decays by itself.
+    pub(crate) fn is_damped(&self) -> bool {
+        self.kind == BodyKind::Dynamic && (self.linear_damping > 0.0 || self.angular_damping > 0.0)
     }
 
     /// Whether it is kinematic and moves.
@@ -703,7 +749,7 @@ impl Body {
         self.check_surface()
     }
 
-    /// Refuses a pose, a velocity, a force, a torque or a share of gravity out of range.
+    /// Refuses a pose, a velocity, a force, a torque, a damping or a share of gravity out of range.
     pub(crate) fn check_motion(&self) -> Result<()> {
         check_place("position", self.position)?;
         check_rotation("rotation", self.rotation)?;
@@ -722,6 +768,11 @@ impl Body {
             let message =
                 || format!("{name} = {load}: must accelerate the body by at most {MOST_GRAVITY:e} along every axis");
             ensure(is_within(acceleration, MOST_GRAVITY), message)?;
+        }
+        for (name, rate) in [("linear_damping", self.linear_damping), ("angular_damping", self.angular_damping)] {
+            ensure((0.0..=MOST_DAMPING).contains(&rate), || {
+                format!("{name} = {rate}: must be 0 to {MOST_DAMPING:e} 1/s")
+            })?;
         }
         let scale = self.gravity_scale;
         ensure(scale.abs() <= MOST_GRAVITY, || {

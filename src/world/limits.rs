@@ -11,6 +11,8 @@ pub const MOST_LENGTH: f32 = 1e9;
 pub const MOST_SPEED: f32 = 1e9;
 /// Largest acceleration along an axis, of gravity (m/s²) and by the force (m/s²) and the torque (rad/s²) on a body.
 pub const MOST_GRAVITY: f32 = 1e9;
+/// Largest rate of damping (1/s).
+pub const MOST_DAMPING: f32 = 1e9;
 
 /// Whether every coordinate of a point is a number of at most [`MOST_LENGTH`].
 pub(super) fn is_place(point: Vec3) -> bool {

@@ -13,6 +13,7 @@ mod breaking;
 mod closed_forms;
 mod conform;
 mod course;
+mod damping;
 mod direct_joints;
 mod events;
 #[cfg(feature = "serde")]
@@ -44,6 +45,7 @@ fn main() -> std::process::ExitCode {
         closed_forms::tests(),
         conform::tests(),
         course::tests(),
+        damping::tests(),
         direct_joints::tests(),
         events::tests(),
         #[cfg(feature = "serde")]

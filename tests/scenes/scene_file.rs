@@ -406,8 +406,8 @@ fn the_schema_describes_every_key() {
     let body = &schema["$defs"]["BodyFile"];
     assert_eq!(
         keys(body),
-        "angular_velocity density force friction gravity_scale groups kind leaves linear_velocity mass mass_properties name \
-         position restitution rotation shapes swept torque"
+        "angular_damping angular_velocity density force friction gravity_scale groups kind leaves linear_damping linear_velocity mass \
+         mass_properties name position restitution rotation shapes swept torque"
     );
     assert_eq!(keys(&schema["$defs"]["SpawnerFile"]), "body count every first");
     assert_eq!(keys(&schema["$defs"]["LeavesFile"]), "after below");

@@ -49,6 +49,8 @@ bindings! {
     Masses "masses": "array<Mass>", Write;
     /// Angular accelerations of the bodies by torques.
     Torques "torques": "array<Torque>", Read;
+    /// What damping does to the bodies.
+    Dampings "dampings": "array<Damping>", Read;
     /// Principal inertia of the bodies that have unequal moments.
     Inertias "inertias": "array<Inertia>", Read;
     /// Manifolds.

@@ -75,6 +75,8 @@ fn body(file: &BodyFile) -> Result<Body> {
     let load = |name, load| checked(name, load, "zero unless the body is dynamic", pushed);
     (body.force, body.torque) = (load("force", file.force)?.into(), load("torque", file.torque)?.into());
     [body.gravity_scale] = finite("gravity_scale", [file.gravity_scale])?;
+    [body.linear_damping] = finite("linear_damping", [file.linear_damping])?;
+    [body.angular_damping] = finite("angular_damping", [file.angular_damping])?;
     body.groups = file.groups;
     body.swept = file.swept;
     let [friction, restitution] =

@@ -132,6 +132,10 @@ pub struct BodyFile {
     pub torque: [f64; 3],
     /// The share of gravity that a dynamic body feels: 0 floats, -1 rises as fast as others fall.
     pub gravity_scale: f64,
+    /// The rate at which the linear velocity of a dynamic body decays (1/s), 0 to 1e9.
+    pub linear_damping: f64,
+    /// The rate at which the angular velocity of a dynamic body decays (1/s), 0 to 1e9.
+    pub angular_damping: f64,
     /// Density of all shapes (kg/m³), more than 0. 1000 for a dynamic body that says nothing about its mass.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
@@ -168,6 +172,8 @@ impl Default for BodyFile {
             force: [0.0; 3],
             torque: [0.0; 3],
             gravity_scale: 1.0,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
             density: None,
             mass: None,
             mass_properties: None,

@@ -80,6 +80,8 @@ fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
         force: numbers(b.force.to_array()),
         torque: numbers(b.torque.to_array()),
         gravity_scale: number(b.gravity_scale),
+        linear_damping: number(b.linear_damping),
+        angular_damping: number(b.angular_damping),
         density: None,
         mass: None,
         mass_properties: (b.kind == BodyKind::Dynamic).then(|| mass(b)),
