@@ -268,6 +268,10 @@ impl Simulation {
             let joints = self.world.joints.len();
             return Err(Error::input(format!("{name} has {joints} joints: a contact problem has none")));
         }
+        if let Some(i) = self.world.bodies.iter().position(|body| body.has_locked_rotation()) {
+            let body = self.world.name_of(i);
+            return Err(Error::input(format!("{body} has locked rotations: a body of a contact problem turns freely")));
+        }
         self.on_device = false;
         let mut stats = StepStats::default();
         if !self.begin_step(dt, &mut stats)? {

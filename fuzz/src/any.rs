@@ -172,6 +172,7 @@ pub struct AnyBody {
     groups: Option<(u8, u8)>,
     gravity_scale: Option<Number>,
     damping: Option<(Number, Number)>,
+    locked: Option<([bool; 3], bool)>,
 }
 
 #[derive(Arbitrary, Clone, Copy, Debug)]
@@ -230,6 +231,9 @@ impl AnyBody {
         }
         if let Some((linear, angular)) = self.damping {
             body = body.linear_damping(linear.0).angular_damping(angular.0);
+        }
+        if let Some((axes, can_sleep)) = self.locked {
+            body = body.locked_rotations(axes).can_sleep(can_sleep);
         }
         body
     }

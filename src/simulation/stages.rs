@@ -15,7 +15,7 @@ use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{Body, BodyKind, MassProperties, Material, World};
+use crate::world::{Body, BodyKind, Surface, World};
 
 /// Everything that a step leaves to the next one, but for what a device keeps.
 pub(super) struct Stages {
@@ -69,7 +69,7 @@ crate::saved::cloned!(Stages {
 struct Key {
     config: SolverConfig,
     /// Body by body.
-    surfaces: Vec<(MassProperties, Material)>,
+    surfaces: Vec<Surface>,
     /// Scale of impulses and preloads; none before the first step.
     scale: Option<StepScale>,
 }
@@ -85,7 +85,7 @@ impl Saved for Key {
         let Self { config, surfaces, scale } = self;
         config.walk(archive)?;
         let bodies = archive.count(surfaces.len())?;
-        surfaces.resize(bodies, (MassProperties::IMMOVABLE, Material::default()));
+        surfaces.resize(bodies, Surface::blank());
         archive.runs(bodies, |i, archive| surfaces[i].walk(archive))?;
         scale.walk(archive)
     }
@@ -97,7 +97,7 @@ pub(super) struct Changes {
     /// Bodies that came, went, or changed kind, groups or shapes, ascending.
     bodies: Vec<usize>,
     settings: bool,
-    /// Masses or materials.
+    /// Masses, locked axes or materials.
     surfaces: bool,
     joints: bool,
     /// The length of a substep or the stiffness of contacts.
@@ -118,7 +118,7 @@ impl Changes {
 
 impl Stages {
     pub fn new(world: &World, config: &SolverConfig) -> Self {
-        let surfaces = world.bodies.iter().map(|b| (b.mass, b.material)).collect();
+        let surfaces = world.bodies.iter().map(Body::surface).collect();
         Self {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
@@ -198,7 +198,7 @@ impl Stages {
         bodies.iter().try_for_each(|&i| world.check_body(i))?;
         let is_new = |i: usize| bodies.binary_search(&i).is_ok();
         let mut known = world.bodies.iter().zip(&self.key.surfaces).enumerate();
-        let surfaces = known.any(|(i, (b, known))| (b.mass, b.material) != *known && !is_new(i));
+        let surfaces = known.any(|(i, (b, known))| b.surface() != *known && !is_new(i));
         let joints = !self.joints.are_of(world) || !bodies.is_empty() && !world.joints.is_empty();
         world.check_gravity()?;
         if surfaces {
@@ -228,8 +228,8 @@ impl Stages {
         }
         if changes.surfaces {
             for (i, (known, body)) in self.key.surfaces.iter_mut().zip(&world.bodies).enumerate() {
-                if *known != (body.mass, body.material) {
-                    *known = (body.mass, body.material);
+                if *known != body.surface() {
+                    *known = body.surface();
                     self.sleep.disturb(i);
                 }
             }
@@ -262,9 +262,9 @@ impl Stages {
         self.effort.follow_bodies(world, changed);
         self.energy.follow_bodies(world, changed);
         self.contacts.follow_bodies(world, changed);
-        self.key.surfaces.resize(world.bodies.len(), (MassProperties::IMMOVABLE, Material::default()));
+        self.key.surfaces.resize(world.bodies.len(), Surface::blank());
         for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
-            self.key.surfaces[i] = (world.bodies[i].mass, world.bodies[i].material);
+            self.key.surfaces[i] = world.bodies[i].surface();
         }
         self.plan_key = None;
     }

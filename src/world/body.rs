@@ -1,6 +1,6 @@
 //! One rigid body: pose, velocity, mass, colliders, material.
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Mat3, Quat, Vec3};
 
 use super::groups::Groups;
 use super::limits::{MOST_DAMPING, MOST_GRAVITY, MOST_SPEED, check_place, check_rotation, is_within};
@@ -171,6 +171,12 @@ pub struct Body {
     pub linear_damping: f32,
     /// The rate at which the angular velocity decays (1/s), 0 or more, likewise.
     pub angular_damping: f32,
+    /// The axes of the world about which the body does not turn: x, y, z. What its angular velocity has about them is gone in the next step.
+    /// About the others it turns as on bearings, by the inertia about those axes, and without gyroscopic torque. Of dynamic bodies; none unless
+    /// set.
+    pub locked_rotations: [bool; 3],
+    /// Whether it may fall asleep; true unless set. A body that may not keeps all awake that it touches or is tied to. Of dynamic bodies.
+    pub can_sleep: bool,
     /// Mass, center of mass and inertia; zero unless dynamic. They do not follow [`Self::colliders`] or [`Self::kind`] where
     /// those are changed later: [`Self::update_mass`] makes them anew. A simulation raises moments of inertia that are
     /// less than a 32nd of the mass times the square of the lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
@@ -201,6 +207,8 @@ crate::saved::cloned!(Body {
     gravity_scale,
     linear_damping,
     angular_damping,
+    locked_rotations,
+    can_sleep,
     mass,
     material,
     groups,
@@ -210,6 +218,16 @@ crate::saved::cloned!(Body {
     applied_force,
     applied_torque,
 });
+
+/// The properties of a body that the rows of its contacts are written for, besides its shapes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Surface {
+    pub mass: MassProperties,
+    pub locked_rotations: [bool; 3],
+    pub material: Material,
+}
+
+crate::saved::fields!(Surface { mass, locked_rotations, material });
 
 /// The source of the mass of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -274,6 +292,8 @@ impl Body {
             gravity_scale,
             linear_damping,
             angular_damping,
+            locked_rotations,
+            can_sleep,
             mass,
             material,
             groups,
@@ -291,6 +311,8 @@ impl Body {
         gravity_scale.walk(archive)?;
         linear_damping.walk(archive)?;
         angular_damping.walk(archive)?;
+        locked_rotations.walk(archive)?;
+        can_sleep.walk(archive)?;
         mass.walk(archive)?;
         material.walk(archive)?;
         groups.walk(archive)?;
@@ -313,6 +335,8 @@ impl Body {
             gravity_scale: 1.0,
             linear_damping: 0.0,
             angular_damping: 0.0,
+            locked_rotations: [false; 3],
+            can_sleep: true,
             mass: MassProperties::IMMOVABLE,
             material: Material::default(),
             groups: Groups::ALL,
@@ -480,6 +504,28 @@ impl Body {
         self
     }
 
+    /// Locks its rotation about some axes of the world: x, y, z. See [`Body::locked_rotations`](Self::locked_rotations).
+    ///
+    /// ```
+    /// use drystone::{Body, Shape, glam::{Mat3, Vec3}};
+    /// let walker = Body::dynamic().shape(Shape::capsule(0.5, 0.3)).locked_rotations([true; 3]);
+    /// assert_eq!(walker.world_inverse_inertia(), Mat3::ZERO);
+    /// // What moves in the plane of x and y turns about z.
+    /// let mut flat = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0).locked_rotations([true, true, false]);
+    /// flat.apply_angular_impulse(Vec3::ONE);
+    /// assert_eq!(flat.angular_velocity, Vec3::Z);
+    /// ```
+    pub fn locked_rotations(mut self, axes: [bool; 3]) -> Self {
+        self.locked_rotations = axes;
+        self
+    }
+
+    /// Lets it fall asleep, or not: [`Body::can_sleep`](Self::can_sleep).
+    pub fn can_sleep(mut self, can: bool) -> Self {
+        self.can_sleep = can;
+        self
+    }
+
     /// Coulomb coefficient.
     pub fn friction(mut self, friction: f32) -> Self {
         self.material.friction = friction;
@@ -577,6 +623,8 @@ impl Body {
             gravity_scale,
             linear_damping,
             angular_damping,
+            locked_rotations,
+            can_sleep,
             mass,
             material,
             groups,
@@ -588,6 +636,7 @@ impl Body {
         } = self;
         (name, kind, mass, gravity_scale) == (&other.name, &other.kind, &other.mass, &other.gravity_scale)
             && (linear_damping, angular_damping) == (&other.linear_damping, &other.angular_damping)
+            && (locked_rotations, can_sleep) == (&other.locked_rotations, &other.can_sleep)
             && (material, groups, swept, weight) == (&other.material, &other.groups, &other.swept, &other.weight)
             && self.has_same_colliders(other)
     }
@@ -604,6 +653,51 @@ impl Body {
     /// Whether its motion decays by itself.
     pub(crate) fn is_damped(&self) -> bool {
         self.kind == BodyKind::Dynamic && (self.linear_damping > 0.0 || self.angular_damping > 0.0)
+    }
+
+    /// Whether it is kept from turning about an axis of the world.
+    pub(crate) fn has_locked_rotation(&self) -> bool {
+        self.kind == BodyKind::Dynamic && self.locked_rotations != [false; 3]
+    }
+
+    /// What is left of an angular velocity about the axes that are not locked.
+    pub(crate) fn allowed_spin(&self, spin: Vec3) -> Vec3 {
+        if !self.has_locked_rotation() {
+            return spin;
+        }
+        let [x, y, z] = self.locked_rotations;
+        Vec3::select(glam::BVec3::new(x, y, z), Vec3::ZERO, spin)
+    }
+
+    /// How its rows are written, besides its shapes.
+    pub(crate) fn surface(&self) -> Surface {
+        Surface { mass: self.mass, locked_rotations: self.locked_rotations, material: self.material }
+    }
+
+    /// How torques accelerate it, in world axes (1/(kg m²)): the inverse of its inertia about the axes that are not locked, zero about those that
+    /// are. Zero unless the body is dynamic.
+    pub fn world_inverse_inertia(&self) -> Mat3 {
+        if !self.has_locked_rotation() {
+            return self.mass.world_inverse_inertia(self.rotation);
+        }
+        let size = f64::from(self.mass.principal_inertia.max_element());
+        if self.locked_rotations == [true; 3] || size <= 0.0 {
+            return Mat3::ZERO;
+        }
+        // By their size, so that no product leaves the range of numbers. A locked axis is put apart from the others.
+        let mut inertia = self.mass.world_inertia(self.rotation).as_dmat3() * size.recip();
+        let locked = (0..3).filter(|&k| self.locked_rotations[k]);
+        for k in locked.clone() {
+            *inertia.col_mut(k) = DVec3::ZERO;
+            (0..3).for_each(|other| inertia.col_mut(other)[k] = 0.0);
+            inertia.col_mut(k)[k] = 1.0;
+        }
+        let mut inverse = inertia.inverse() * size.recip();
+        for k in locked {
+            *inverse.col_mut(k) = DVec3::ZERO;
+            (0..3).for_each(|other| inverse.col_mut(other)[k] = 0.0);
+        }
+        inverse.as_mat3()
     }
 
     /// Whether it is kinematic and moves.
@@ -658,7 +752,7 @@ impl Body {
     /// Changes the angular velocity at once; an angular impulse in world axes (N m s).
     pub fn apply_angular_impulse(&mut self, impulse: Vec3) {
         if self.kind == BodyKind::Dynamic {
-            self.angular_velocity += self.mass.world_inverse_inertia(self.rotation) * impulse;
+            self.angular_velocity += self.world_inverse_inertia() * impulse;
         }
     }
 
@@ -759,7 +853,7 @@ impl Body {
         }
         let loads = [self.whole_force(), self.whole_torque()];
         let accelerations = if loads != [Vec3::ZERO; 2] && self.kind == BodyKind::Dynamic && self.mass.mass > 0.0 {
-            [loads[0] / self.mass.mass, self.mass.world_inverse_inertia(self.rotation) * loads[1]]
+            [loads[0] / self.mass.mass, self.world_inverse_inertia() * loads[1]]
         } else {
             // Nothing where a load is a number.
             loads.map(|load| 0.0 * load)

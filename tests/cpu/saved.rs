@@ -114,6 +114,21 @@ fn damped_bodies_go_on_to_the_same_bits() {
     goes_on("damped", &scene("pile", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40], damp);
 }
 
+/// The same of axes that are locked while the run goes on.
+#[test]
+fn locked_bodies_go_on_to_the_same_bits() {
+    let lock = |step: u32, world: &mut World| {
+        if step == 12 || step == 50 {
+            let of = |(k, body): (usize, &mut Body)| {
+                body.locked_rotations = [k % 2 > 0, k % 3 > 0, step == 12 && k % 5 > 0];
+                body.can_sleep = k % 4 > 0;
+            };
+            world.bodies.iter_mut().enumerate().for_each(of);
+        }
+    };
+    goes_on("locked", &scene("pile-mixed", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40, 50, 51], lock);
+}
+
 #[test]
 fn islands_of_higher_effort_go_on_to_the_same_bits() {
     let world = scene("mass-ratio", &[]);

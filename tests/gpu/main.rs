@@ -29,6 +29,7 @@ mod joints;
 mod kernels;
 mod living;
 mod living_random;
+mod locked;
 mod masses;
 mod problems;
 mod resident;
@@ -60,6 +61,7 @@ fn main() -> std::process::ExitCode {
         joints::tests(),
         kernels::tests(),
         living::tests(),
+        locked::tests(),
         living_random::tests(),
         masses::tests(),
         problems::tests(),

@@ -77,6 +77,7 @@ fn body(file: &BodyFile) -> Result<Body> {
     [body.gravity_scale] = finite("gravity_scale", [file.gravity_scale])?;
     [body.linear_damping] = finite("linear_damping", [file.linear_damping])?;
     [body.angular_damping] = finite("angular_damping", [file.angular_damping])?;
+    (body.locked_rotations, body.can_sleep) = (file.locked_rotations, file.can_sleep);
     body.groups = file.groups;
     body.swept = file.swept;
     let [friction, restitution] =

@@ -136,6 +136,10 @@ pub struct BodyFile {
     pub linear_damping: f64,
     /// The rate at which the angular velocity of a dynamic body decays (1/s), 0 to 1e9.
     pub angular_damping: f64,
+    /// Whether a dynamic body does not turn about the axes x, y and z of the world.
+    pub locked_rotations: [bool; 3],
+    /// Whether a dynamic body may fall asleep.
+    pub can_sleep: bool,
     /// Density of all shapes (kg/m³), more than 0. 1000 for a dynamic body that says nothing about its mass.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
@@ -174,6 +178,8 @@ impl Default for BodyFile {
             gravity_scale: 1.0,
             linear_damping: 0.0,
             angular_damping: 0.0,
+            locked_rotations: [false; 3],
+            can_sleep: true,
             density: None,
             mass: None,
             mass_properties: None,

@@ -82,6 +82,8 @@ fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
         gravity_scale: number(b.gravity_scale),
         linear_damping: number(b.linear_damping),
         angular_damping: number(b.angular_damping),
+        locked_rotations: b.locked_rotations,
+        can_sleep: b.can_sleep,
         density: None,
         mass: None,
         mass_properties: (b.kind == BodyKind::Dynamic).then(|| mass(b)),
