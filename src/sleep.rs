@@ -5,7 +5,7 @@
 //! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it or is tied to it, or when
 //! the caller changes the pose or velocity of one of its bodies, a force, torque or gravity on it, or the pose of a body under it or at the other
 //! end of one of its joints. A body that
-//! touches nothing never sleeps, nor does an island of a body that may not ([`Body::can_sleep`]), nor an island of which a body still comes out of another. Everything is decided in the order of bodies and pairs, whatever the number of threads.
+//! touches nothing never sleeps, nor does an island of a body that may not (`Body::can_sleep`), nor an island of which a body still comes out of another. Everything is decided in the order of bodies and pairs, whatever the number of threads.
 
 use glam::{Quat, Vec3};
 

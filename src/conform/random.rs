@@ -310,7 +310,7 @@ fn contact_row(random: &mut Random, [body_a, body_b]: [u32; 2], first_point: u32
 /// Some bodies lose nothing, some of one velocity only, some of both.
 fn damping_row(body: u32) -> DampingRow {
     let mut row = DampingRow::default();
-    if is_movable(body) && body % 4 > 0 {
+    if is_movable(body) && !body.is_multiple_of(4) {
         row.linear_gain = [0.2, -0.4, 0.1].map(|x| x * (body as f32 / 50.0 - 1.0));
         row.linear_loss = body as f32 / 200.0;
     }

@@ -190,6 +190,8 @@ pub struct Body {
     /// Shapes on the body; several make a compound. The mass does not follow a change of them: call [`Self::update_mass`].
     pub colliders: Vec<Collider>,
     weight: Weight,
+    /// What is added to the mass of the shapes.
+    additional: MassProperties,
     /// Force and torque of the next step alone.
     pub(super) applied_force: Vec3,
     pub(super) applied_torque: Vec3,
@@ -215,6 +217,7 @@ crate::saved::cloned!(Body {
     swept,
     colliders,
     weight,
+    additional,
     applied_force,
     applied_torque,
 });
@@ -300,6 +303,7 @@ impl Body {
             swept,
             colliders,
             weight,
+            additional,
             applied_force,
             applied_torque,
         } = self;
@@ -318,7 +322,8 @@ impl Body {
         groups.walk(archive)?;
         swept.walk(archive)?;
         colliders.walk(archive)?;
-        weight.walk(archive)
+        weight.walk(archive)?;
+        additional.walk(archive)
     }
 
     /// A body of this kind, without shapes.
@@ -343,6 +348,7 @@ impl Body {
             swept: false,
             colliders: Vec::new(),
             weight: Weight::Density(1000.0),
+            additional: MassProperties::IMMOVABLE,
             applied_force: Vec3::ZERO,
             applied_torque: Vec3::ZERO,
         }
@@ -433,6 +439,24 @@ impl Body {
         self.weighing(Weight::Total(mass))
     }
 
+    /// Mass that is added to that of the shapes, with its center and inertia in the body's frame; [`MassProperties::point`] is a point mass. A second
+    /// call takes the place of the first. It adds nothing where [`Self::mass_properties`] gives the mass of the whole body.
+    ///
+    /// ```
+    /// use drystone::{Body, MassProperties, Shape, glam::Vec3};
+    ///
+    /// // A cube of 6 kg and 1 kg m², with as much again 2 m above its center.
+    /// let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0);
+    /// let tall = cube.additional_mass(MassProperties::point(6.0, Vec3::Y * 2.0)).mass;
+    /// assert_eq!((tall.mass, tall.center), (12.0, Vec3::Y));
+    /// assert!((tall.principal_inertia - Vec3::new(13.0, 1.0, 13.0)).length() < 1e-5);
+    /// ```
+    pub fn additional_mass(mut self, mass: MassProperties) -> Self {
+        self.additional = mass;
+        self.update_mass();
+        self
+    }
+
     fn weighing(mut self, weight: Weight) -> Self {
         self.weight = weight;
         self.update_mass();
@@ -479,7 +503,7 @@ impl Body {
         self
     }
 
-    /// The rate at which its linear velocity decays (1/s), 0 or more: [`Body::linear_damping`](Self::linear_damping).
+    /// The rate at which its linear velocity decays (1/s), 0 or more: [the field](Body#structfield.linear_damping).
     ///
     /// ```
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
@@ -504,7 +528,7 @@ impl Body {
         self
     }
 
-    /// Locks its rotation about some axes of the world: x, y, z. See [`Body::locked_rotations`](Self::locked_rotations).
+    /// Locks its rotation about some axes of the world: x, y, z. See [the field](Body#structfield.locked_rotations).
     ///
     /// ```
     /// use drystone::{Body, Shape, glam::{Mat3, Vec3}};
@@ -520,7 +544,7 @@ impl Body {
         self
     }
 
-    /// Lets it fall asleep, or not: [`Body::can_sleep`](Self::can_sleep).
+    /// Lets it fall asleep, or not: [the field](Body#structfield.can_sleep).
     pub fn can_sleep(mut self, can: bool) -> Self {
         self.can_sleep = can;
         self
@@ -565,7 +589,7 @@ impl Body {
         self
     }
 
-    /// Makes mass, center and inertia anew from the shapes as they are now, by the density or the total mass that was given: for
+    /// Makes mass, center and inertia anew from the shapes as they are now, by the density or the total mass that was given, and from the [additional mass](Self::additional_mass): for
     /// a body whose [`colliders`](Self::colliders) or [`kind`](Self::kind) were changed. It does nothing where
     /// [`Self::mass_properties`] gave them, and to bodies that are not dynamic.
     ///
@@ -583,12 +607,13 @@ impl Body {
         }
         let solids: Vec<&Collider> = self.solids().filter(|c| c.shape.has_volume()).collect();
         let at = |density: f32| MassProperties::of_solids(&solids, density);
-        self.mass = match self.weight {
+        let own = match self.weight {
             Weight::Density(density) => at(density),
             Weight::Total(mass) if !solids.is_empty() => at(mass / at(1.0).mass),
             Weight::Total(_) => MassProperties::IMMOVABLE,
             Weight::Given => return,
         };
+        self.mass = own.plus(&self.additional);
     }
 
     /// Refuses a mass that no dynamic body can have, by what it follows from.
@@ -631,6 +656,7 @@ impl Body {
             swept,
             colliders: _,
             weight,
+            additional,
             applied_force: _,
             applied_torque: _,
         } = self;
@@ -638,6 +664,7 @@ impl Body {
             && (linear_damping, angular_damping) == (&other.linear_damping, &other.angular_damping)
             && (locked_rotations, can_sleep) == (&other.locked_rotations, &other.can_sleep)
             && (material, groups, swept, weight) == (&other.material, &other.groups, &other.swept, &other.weight)
+            && *additional == other.additional
             && self.has_same_colliders(other)
     }
 
@@ -892,6 +919,7 @@ impl Body {
         let is_friction = friction >= 0.0 && friction.is_finite();
         ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
         ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))?;
+        self.additional.check_additional().map_err(|e| e.within("additional_mass"))?;
         if self.kind == BodyKind::Dynamic { self.check_mass() } else { self.mass.check_frame() }
     }
 

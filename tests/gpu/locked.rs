@@ -1,7 +1,7 @@
 //! Bodies that turn about some axes of the world only.
 
 use crate::common::{Open, gpu};
-use drystone::glam::{Mat3, Quat, Vec3};
+use drystone::glam::{DVec3, Mat3, Quat, Vec3};
 use drystone::{Body, Cpu, Joint, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
 
 tests! {
@@ -164,18 +164,27 @@ fn lanes_have_the_bits_of_the_reference_with_locked_axes() {
     same_as_the_reference(|| Box::new(Cpu::new()));
 }
 
-/// Locks take angular momentum about their own axes only, and no linear momentum.
+/// Locks take momentum about their own axes only: what meets in a plane moves as without locks, and keeps its linear momentum.
 fn free_axes_keep_their_momentum() {
-    let mut world = weightless();
-    // A cube and a ball that meet beside their centers, in a plane across z.
-    world.add(cube().locked_rotations([true, true, false]).restitution(0.5));
-    let ball = Body::dynamic().shape(Shape::ball(0.3)).total_mass(2.0).position(-1.5, 0.4, 0.0).restitution(0.5);
-    world.add(ball.velocity(Vec3::X * 3.0, Vec3::Z).locked_rotations([true, true, false]));
-    let before = (world.linear_momentum(), world.angular_momentum().z);
-    let world = after(world, 8, 60, reference);
-    let now = (world.linear_momentum(), world.angular_momentum().z);
-    assert!((now.0 - before.0).length() < 1e-5 && (now.1 - before.1).abs() < 1e-4, "{now:?}, not {before:?}");
-    assert!(world.bodies[0].angular_velocity.z.abs() > 0.1 && world.bodies[0].position.z == 0.0);
+    let meet = |axes: [bool; 3]| {
+        let mut world = weightless();
+        // A cube and a ball that meet beside their centers, in a plane across z; friction takes steps by the inertia about all axes.
+        world.add(cube().locked_rotations(axes).restitution(0.5).friction(0.0));
+        let ball = Body::dynamic().shape(Shape::ball(0.3)).total_mass(2.0).position(-1.5, 0.4, 0.0).restitution(0.5);
+        world.add(ball.friction(0.0).velocity(Vec3::X * 3.0, Vec3::Z).locked_rotations(axes));
+        after(world, 8, 60, reference)
+    };
+    let [free, locked] = [[false; 3], [true, true, false]].map(meet);
+    for world in [&free, &locked] {
+        assert!((world.linear_momentum() - DVec3::X * 6.0).length() < 1e-5, "{}", world.linear_momentum());
+    }
+    let [free_momentum, momentum] = [&free, &locked].map(|world| world.angular_momentum().z);
+    assert!((momentum - free_momentum).abs() < 1e-5, "{momentum}, not {free_momentum}");
+    for (body, free) in locked.bodies.iter().zip(&free.bodies) {
+        assert!((body.angular_velocity - free.angular_velocity).length() < 1e-5, "{}", body.angular_velocity);
+        assert_eq!(body.position.z, 0.0);
+    }
+    assert!(locked.bodies[0].angular_velocity.z.abs() > 0.1);
 }
 
 fn axes_that_a_caller_locks_stop_in_the_next_step() {

@@ -149,6 +149,9 @@ pub struct BodyFile {
     /// Mass, center and inertia, instead of those of the shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass_properties: Option<MassFile>,
+    /// Mass that is added to that of the shapes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub additional_mass: Option<AdditionalMassFile>,
     /// Coulomb coefficient, 0 or more. Two bodies meet with the geometric mean of theirs.
     pub friction: f64,
     /// Ratio of separation to approach velocity, 0 to 1. Two bodies meet with the larger of theirs.
@@ -183,6 +186,7 @@ impl Default for BodyFile {
             density: None,
             mass: None,
             mass_properties: None,
+            additional_mass: None,
             friction: 0.5,
             restitution: 0.0,
             groups: Groups::ALL,
@@ -191,6 +195,24 @@ impl Default for BodyFile {
             shapes: Vec::new(),
         }
     }
+}
+
+/// Mass that is added to that of the shapes of a body, in the body's frame.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Additional mass")]
+pub struct AdditionalMassFile {
+    /// Mass (kg), more than 0.
+    pub mass: f64,
+    /// Its center (m).
+    #[serde(default)]
+    pub center: [f64; 3],
+    /// Moments of inertia about its principal axes through its center (kg m²), 0 or more: 0 of a point mass.
+    #[serde(default)]
+    pub principal_inertia: [f64; 3],
+    /// Rotation from its principal axes to the body's frame: a quaternion x, y, z, w.
+    #[serde(default = "defaults::rotation")]
+    pub principal_frame: [f64; 4],
 }
 
 /// Mass, center of mass and inertia of a body, in its own frame.

@@ -87,6 +87,7 @@ fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
         density: None,
         mass: None,
         mass_properties: (b.kind == BodyKind::Dynamic).then(|| mass(b)),
+        additional_mass: None,
         friction: number(b.material.friction),
         restitution: number(b.material.restitution),
         groups: b.groups,
