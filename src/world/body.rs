@@ -532,7 +532,8 @@ impl Body {
     ///
     /// ```
     /// use drystone::{Body, Shape, glam::{Mat3, Vec3}};
-    /// let walker = Body::dynamic().shape(Shape::capsule(0.5, 0.3)).locked_rotations([true; 3]);
+    /// let walker = Body::dynamic().shape(Shape::capsule(0.5, 0.3)).locked_rotations([true; 3]).can_sleep(false);
+    /// assert!(!walker.can_sleep);
     /// assert_eq!(walker.world_inverse_inertia(), Mat3::ZERO);
     /// // What moves in the plane of x and y turns about z.
     /// let mut flat = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0).locked_rotations([true, true, false]);

@@ -19,8 +19,8 @@ use crate::world::{BodyKind, Groups};
 ///
 /// ```
 /// use drystone::scenes::{
-///     AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,
-///     SpawnerFile, SpringFile,
+///     AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile,
+///     ShapeFile, SpawnerFile, SpringFile,
 /// };
 ///
 /// let text = r#"{"version": 1,
@@ -28,15 +28,16 @@ use crate::world::{BodyKind, Groups};
 ///         {"name": "door", "position": [0.5, 1, 0], "leaves": {"after": 9},
 ///          "mass_properties": {"mass": 20, "principal_inertia": [1, 1, 1]},
 ///          "shapes": [{"type": "cuboid", "half_extents": [0.5, 1, 0.02]}]},
-///         {"name": "lamp", "position": [3, 1, 0], "shapes": [{"type": "ball", "radius": 0.1}]}],
+///         {"name": "lamp", "position": [3, 1, 0], "additional_mass": {"mass": 2}, "shapes": [{"type": "ball", "radius": 0.1}]}],
 ///     "joints": [
 ///         {"type": "hinge", "bodies": ["door"], "anchor": [0, 1, 0], "axis": [0, 1, 0], "motor": {"speed": 1, "max_load": 9}},
 ///         {"type": "generic", "bodies": [1], "anchor": [3, 2, 0], "linear": [{}, {"spring": {"frequency": 2}}, {}], "angular": [{}, {}, {}]}],
 ///     "spawners": [{"every": 60, "body": {"shapes": [{"type": "ball", "radius": 0.3}]}}]}"#;
 /// let file = SceneFile::parse(text)?;
-/// let [BodyFile { leaves, mass_properties, shapes, .. }, _] = &file.bodies[..] else { panic!("two bodies") };
+/// let [BodyFile { leaves, mass_properties, shapes, .. }, BodyFile { additional_mass, .. }] = &file.bodies[..] else { panic!("two bodies") };
 /// assert!(matches!(leaves, Some(LeavesFile { after: Some(9.0), below: None })));
 /// assert!(matches!(mass_properties, Some(MassFile { mass: 20.0, .. })));
+/// assert!(matches!(additional_mass, Some(AdditionalMassFile { mass: 2.0, principal_inertia: [0.0, 0.0, 0.0], .. })));
 /// assert!(matches!(&shapes[..], [ShapeFile { geometry: Geometry::Cuboid { .. }, sensor: false, .. }]));
 /// let [door, lamp]: &[JointFile; 2] = file.joints[..].try_into().expect("two joints");
 /// assert!(matches!(&door.bodies[..], [BodyRef::Name(name)] if name == "door"));
