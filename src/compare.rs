@@ -272,13 +272,14 @@ fn first_rows(a: &StepProblem, b: &StepProblem) -> Option<&'static str> {
 }
 
 /// All fields of a problem, as bytes.
-fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 25] {
+fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 26] {
     // This pattern makes a new field a compile error until it is listed here.
     let StepProblem {
         params,
         bodies,
         masses,
         torques,
+        dampings,
         inertias,
         contacts,
         points,
@@ -302,6 +303,7 @@ fn fields(problem: &StepProblem) -> [(&'static str, &[u8]); 25] {
         ("bodies", bytemuck::cast_slice(bodies)),
         ("masses", bytemuck::cast_slice(masses)),
         ("torques", bytemuck::cast_slice(torques)),
+        ("dampings", bytemuck::cast_slice(dampings)),
         ("inertias", bytemuck::cast_slice(inertias)),
         ("contacts", bytemuck::cast_slice(contacts)),
         ("points", bytemuck::cast_slice(points)),

@@ -18,6 +18,7 @@ use crate::effort::Effort;
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
 use crate::math::rotation::{product, unit};
+use crate::problem::damping::Decay;
 use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
@@ -646,10 +647,13 @@ fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<
     let body = |i: usize| {
         let body = &world.bodies[i];
         let [place, v, w] = [body.center_of_mass(), body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
-        (i, place, [v + Vec3::from(problem.masses[i].acceleration).as_dvec3() * dt, w], Quat::IDENTITY)
+        let [of_v, of_w] = [body.linear_damping, body.angular_damping].map(|rate| Decay::of(rate, dt));
+        let gained = Vec3::from(problem.masses[i].acceleration).as_dvec3() * of_v.gain;
+        (i, place, [v * (1.0 - of_v.loss) + gained, w * (1.0 - of_w.loss)], Quat::IDENTITY)
     };
     let mut all = Momenta::of(world, members.clone().map(body));
-    all.angular += members.map(|i| world.bodies[i].whole_torque().as_dvec3() * dt).sum::<DVec3>();
+    let torque = |body: &Body| body.whole_torque().as_dvec3() * Decay::of(body.angular_damping, dt).gain;
+    all.angular += members.map(|i| torque(&world.bodies[i])).sum::<DVec3>();
     all
 }
 

@@ -279,17 +279,27 @@ impl Simulation {
             let joints = self.world.joints.len();
             return Err(Error::input(format!("{name} has {joints} joints: a contact problem cannot have joints")));
         }
+        if let Some(i) = self.world.bodies.iter().position(|body| body.has_locked_rotation()) {
+            let body = self.world.name_of(i);
+            return Err(Error::input(format!("{body} has locked rotations: a body of a contact problem turns freely")));
+        }
         self.on_device = false;
         let mut stats = StepStats::default();
         if !self.begin_step(dt, &mut stats)? {
             return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
         }
-        use Kernel::{BeginChanges, EndChanges, IntegrateGyroscopic, IntegrateTorques, IntegrateVelocities};
+        use Kernel::{
+            BeginChanges, DampVelocities, EndChanges, IntegrateGyroscopic, IntegrateTorques, IntegrateVelocities,
+        };
         let forces = |p: &&Pass| {
             let Pass { kernel, .. } = p;
             matches!(
                 kernel,
-                BeginChanges | IntegrateVelocities { .. } | IntegrateTorques { .. } | IntegrateGyroscopic { .. }
+                BeginChanges
+                    | IntegrateVelocities { .. }
+                    | IntegrateTorques { .. }
+                    | DampVelocities { .. }
+                    | IntegrateGyroscopic { .. }
             )
         };
         let blocks = self.stages.plan.passes.chunk_by(|p, q| p.block == q.block);

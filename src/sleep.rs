@@ -5,7 +5,7 @@
 //! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it or is tied to it, or when
 //! the caller changes the pose or velocity of one of its bodies, a force, torque or gravity on it, or the pose of a body under it or at the other
 //! end of one of its joints. A body that
-//! touches nothing never sleeps, nor does an island of which a body still comes out of another. Everything is decided in the order of bodies and pairs, whatever the number of threads.
+//! touches nothing never sleeps, nor does an island of a body that may not (`Body::can_sleep`), nor an island of which a body still comes out of another. Everything is decided in the order of bodies and pairs, whatever the number of threads.
 
 use glam::{Quat, Vec3};
 
@@ -258,7 +258,7 @@ impl Sleep {
     pub fn before_step(&mut self, world: &World, detector: &Detector) {
         for i in 0..self.asleep.len() {
             let body = &world.bodies[i];
-            if self.asleep[i] && self.left[i] != Snapshot::of(world, i) {
+            if self.asleep[i] && (!body.can_sleep || self.left[i] != Snapshot::of(world, i)) {
                 self.wake(i);
             }
             self.activity[i] = match body.kind {
@@ -351,7 +351,8 @@ impl Sleep {
         }
         let awake: Vec<usize> = (0..self.asleep.len()).filter(|&i| is_dynamic(i) && !self.asleep[i]).collect();
         for &i in &awake {
-            restless[self.islands.root(i as u32) as usize] |= self.slow_for[i] < self.after || !held[i] || driven[i];
+            restless[self.islands.root(i as u32) as usize] |=
+                self.slow_for[i] < self.after || !held[i] || driven[i] || !world.bodies[i].can_sleep;
         }
         for i in awake {
             let root = self.islands.root(i as u32) as usize;

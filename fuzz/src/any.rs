@@ -171,6 +171,8 @@ pub struct AnyBody {
     mass: Option<AnyMass>,
     groups: Option<(u8, u8)>,
     gravity_scale: Option<Number>,
+    damping: Option<(Number, Number)>,
+    locked: Option<([bool; 3], bool)>,
 }
 
 #[derive(Arbitrary, Clone, Copy, Debug)]
@@ -226,6 +228,12 @@ impl AnyBody {
         }
         if let Some(scale) = self.gravity_scale {
             body = body.gravity_scale(scale.0);
+        }
+        if let Some((linear, angular)) = self.damping {
+            body = body.linear_damping(linear.0).angular_damping(angular.0);
+        }
+        if let Some((axes, can_sleep)) = self.locked {
+            body = body.locked_rotations(axes).can_sleep(can_sleep);
         }
         body
     }

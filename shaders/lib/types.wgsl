@@ -12,6 +12,8 @@ struct Mass {
 
 struct Torque { angular_acceleration: vec3f }
 
+struct Damping { linear_gain: vec3f, linear_loss: f32, angular_gain: vec3f, angular_loss: f32 }
+
 struct Inertia { principal: vec3f, body: u32, inv_principal: vec3f, frame: vec4f }
 
 struct Contact {

@@ -61,6 +61,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             | Kernel::EndChanges
             | Kernel::IntegratePositions { .. } => (bodies, None),
             Kernel::IntegrateTorques { .. } => (if problem.torques.is_empty() { 0..0 } else { bodies }, None),
+            Kernel::DampVelocities { .. } => (if problem.dampings.is_empty() { 0..0 } else { bodies }, None),
             Kernel::IntegrateGyroscopic { .. } => (inertias, None),
             Kernel::BeginSystems | Kernel::SolveJointSystems(_) => (systems, None),
             Kernel::TurnInertias => (turning, None),

@@ -61,6 +61,8 @@ pub fn every_kernel() -> Vec<Kernel> {
         Kernel::EndChanges,
         Kernel::IntegrateTorques { from_start: false },
         Kernel::IntegrateTorques { from_start: true },
+        Kernel::DampVelocities { from_start: false },
+        Kernel::DampVelocities { from_start: true },
         Kernel::IntegrateGyroscopic { from_start: false },
         Kernel::IntegrateGyroscopic { from_start: true },
         Kernel::IntegratePositions { from_start: false },
@@ -127,6 +129,7 @@ fn colors_of(kernel: Kernel, problem: &StepProblem) -> Range<u32> {
         | Kernel::ApplyRestitution(_) => contacts,
         Kernel::IntegrateVelocities { .. }
         | Kernel::IntegrateTorques { .. }
+        | Kernel::DampVelocities { .. }
         | Kernel::BeginChanges
         | Kernel::EndChanges
         | Kernel::IntegratePositions { .. } => bodies,
@@ -171,7 +174,9 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     let mut ways = vec![in_one_pass(kernel, problem), color_by_color(kernel, problem)];
     if matches!(
         kernel,
-        Kernel::IntegrateTorques { from_start: false } | Kernel::IntegrateGyroscopic { from_start: false }
+        Kernel::IntegrateTorques { from_start: false }
+            | Kernel::DampVelocities { from_start: false }
+            | Kernel::IntegrateGyroscopic { from_start: false }
     ) {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &color_by_color(sweep(), problem)].concat());

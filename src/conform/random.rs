@@ -7,8 +7,8 @@ use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use crate::problem::StepProblem;
 use crate::problem::softness::softness;
 use crate::problem::{
-    AxisRow, BodyRow, ContactRow, ConvergenceRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow, NO_LIMIT,
-    NodeRow, Params, PointRow, Substep, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ConvergenceRow, DampingRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,
+    MassRow, NO_LIMIT, NodeRow, Params, PointRow, Substep, TorqueRow, TurningRow,
 };
 use crate::random::SplitMix64;
 
@@ -82,6 +82,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
             torque.angular_acceleration = [1.0, 0.3, -0.7].map(|x| x * (body as f32 - 70.0));
         }
         problem.torques.push(torque);
+        problem.dampings.push(damping_row(body));
         if is_movable(body) && random.happens(0.5) {
             problem.inertias.push(inertia_row(random, body));
         }
@@ -171,6 +172,7 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     }
     problem.masses.iter_mut().flat_map(|row| &mut row.acceleration).for_each(scale);
     problem.torques.iter_mut().flat_map(|row| &mut row.angular_acceleration).for_each(scale);
+    problem.dampings.iter_mut().flat_map(|row| row.linear_gain.iter_mut().chain(&mut row.angular_gain)).for_each(scale);
     problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.approach_velocity]).for_each(scale);
     problem.joints.iter_mut().flat_map(|row| &mut row.gap).for_each(scale);
     problem.axes.iter_mut().flat_map(|row| [&mut row.gap, &mut row.speed, &mut row.max_impulse]).for_each(scale);
@@ -302,6 +304,20 @@ fn contact_row(random: &mut Random, [body_a, body_b]: [u32; 2], first_point: u32
     row.point_count = point_count;
     row.radius_a = or_zero(0.5);
     row.radius_b = or_zero(0.5);
+    row
+}
+
+/// Some bodies lose nothing, some of one velocity only, some of both.
+fn damping_row(body: u32) -> DampingRow {
+    let mut row = DampingRow::default();
+    if is_movable(body) && !body.is_multiple_of(4) {
+        row.linear_gain = [0.2, -0.4, 0.1].map(|x| x * (body as f32 / 50.0 - 1.0));
+        row.linear_loss = body as f32 / 200.0;
+    }
+    if is_movable(body) && body % 4 > 1 {
+        row.angular_gain = [-0.3, 0.1, 0.5].map(|x| x * (body as f32 / 50.0 - 2.0));
+        row.angular_loss = 1.0 - body as f32 / 300.0;
+    }
     row
 }
 

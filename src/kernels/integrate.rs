@@ -1,11 +1,11 @@
-//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_torques`, `integrate_gyroscopic`,
+//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_torques`, `damp_velocities`, `integrate_gyroscopic`,
 //! `integrate_positions`, `begin_changes` and `end_changes`.
 //!
 //! In a block of short substeps the velocities of a body are changes since the step began, and [`Free`] holds the velocities from
 //! then: `from_start`. A short substep changes a velocity by little more than the rounding error of the velocity, but by much more
 //! than that of the change.
 
-use super::rows::{Body, Free, Inertia, Mass, StepParams};
+use super::rows::{Body, Damping, Free, Inertia, Mass, StepParams};
 use crate::math::{
     Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, turned, vec3,
 };
@@ -52,6 +52,31 @@ pub fn integrate_torque<L: Lane>(
     body.w += turn;
 }
 
+/// Lets the velocity decay that a body has without the impulses of this substep. The velocities of a body without damping keep every bit.
+#[inline(always)]
+pub fn damp_velocities<L: Lane>(from_start: bool, damping: &Damping<L>, body: &mut Body<L>, free: &mut Free<L>) {
+    let (mut v, mut w) = (free.v, free.w);
+    if from_start {
+        (v, w) = (v + body.v, w + body.w);
+    }
+    let change_v = damping.linear_gain - v * damping.linear_loss;
+    let change_w = damping.angular_gain - w * damping.angular_loss;
+    let is_slowed = damping.linear_loss.gt(L::constant(0.0));
+    let is_braked = damping.angular_loss.gt(L::constant(0.0));
+    if !from_start {
+        free.v = chosen(free.v, free.v + change_v, is_slowed);
+        free.w = chosen(free.w, free.w + change_w, is_braked);
+    }
+    body.v = chosen(body.v, body.v + change_v, is_slowed);
+    body.w = chosen(body.w, body.w + change_w, is_braked);
+}
+
+/// The second vector where the mask holds, else the first.
+#[inline(always)]
+fn chosen<L: Lane>(u: Vec3<L>, v: Vec3<L>, mask: L::Mask) -> Vec3<L> {
+    vec3(L::select(u.x, v.x, mask), L::select(u.y, v.y, mask), L::select(u.z, v.z, mask))
+}
+
 /// Moves a body by its velocity.
 #[inline(always)]
 pub fn integrate_positions<L: Lane>(from_start: bool, params: &StepParams<L>, body: &mut Body<L>, free: &Free<L>) {
@@ -81,14 +106,8 @@ pub fn end_changes<L: Lane>(body: &mut Body<L>, free: &Free<L>) {
 #[inline(always)]
 pub fn start_of<L: Lane>(mass: &Mass<L>, free: &Free<L>) -> Free<L> {
     let is_movable = mass.inv_mass.gt(L::constant(0.0));
-    Free { v: vector_if(is_movable, free.v), w: vector_if(is_movable, free.w) }
-}
-
-/// The vector where the mask holds, else zero.
-#[inline(always)]
-fn vector_if<L: Lane>(mask: L::Mask, u: Vec3<L>) -> Vec3<L> {
-    let zero = L::constant(0.0);
-    vec3(L::select(zero, u.x, mask), L::select(zero, u.y, mask), L::select(zero, u.z, mask))
+    let zero = vec3(L::constant(0.0), L::constant(0.0), L::constant(0.0));
+    Free { v: chosen(zero, free.v, is_movable), w: chosen(zero, free.w, is_movable) }
 }
 
 /// Solves rows x = g by Cramer's rule.

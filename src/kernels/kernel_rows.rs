@@ -1,6 +1,6 @@
 //! A whole problem as the kernels see it.
 
-use super::rows::{Axis, Body, Contact, Impulse, Inertia, Joint, Mass, Momentum, Point, StepParams};
+use super::rows::{Axis, Body, Contact, Damping, Impulse, Inertia, Joint, Mass, Momentum, Point, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::problem::StepProblem;
 
@@ -15,6 +15,8 @@ pub struct KernelRows<S> {
     pub masses: Vec<Mass<S>>,
     /// Their angular accelerations by torques, if any has one.
     pub torques: Vec<Vec3<S>>,
+    /// What damping does to them, if any is damped.
+    pub dampings: Vec<Damping<S>>,
     /// Principal inertia of those whose moments differ.
     pub inertias: Vec<Inertia<S>>,
     /// Manifolds.
@@ -48,6 +50,7 @@ impl<S: Scalar> KernelRows<S> {
         refill(&problem.bodies, &mut self.bodies, Body::load);
         refill(&problem.masses, &mut self.masses, Mass::load);
         refill(&problem.torques, &mut self.torques, |r| Vec3::load(r.angular_acceleration));
+        refill(&problem.dampings, &mut self.dampings, Damping::load);
         refill(&problem.inertias, &mut self.inertias, Inertia::load);
         refill(&problem.contacts, &mut self.contacts, Contact::load);
         refill(&problem.points, &mut self.points, Point::load);

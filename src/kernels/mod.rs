@@ -18,7 +18,7 @@ pub(crate) mod rows;
 
 pub use kernel_rows::KernelRows;
 pub use rows::{
-    Axis, Body, Contact, Free, Impulse, ImpulseStep, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf,
+    Axis, Body, Contact, Damping, Free, Impulse, ImpulseStep, Inertia, Joint, Mass, Momentum, Pair, Point, SoftnessOf,
     StepParams, Sym3,
 };
 

@@ -2,8 +2,8 @@
 
 use crate::math::{Lane, Quat, Scalar, Vec3};
 use crate::problem::{
-    AxisRow, BodyRow, ContactRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow, Softness,
-    Substep,
+    AxisRow, BodyRow, ContactRow, DampingRow, ImpulseRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, PointRow,
+    Softness, Substep,
 };
 pub use crate::problem::{Mass, Sym3};
 
@@ -28,6 +28,19 @@ pub struct Free<L> {
     pub v: Vec3<L>,
     /// Angular velocity.
     pub w: Vec3<L>,
+}
+
+/// Double of the WGSL struct `Damping`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Damping<L> {
+    /// What the velocity gains besides the plain acceleration.
+    pub linear_gain: Vec3<L>,
+    /// The share of the velocity that is lost.
+    pub linear_loss: L,
+    /// What the angular velocity gains.
+    pub angular_gain: Vec3<L>,
+    /// The share of the angular velocity that is lost.
+    pub angular_loss: L,
 }
 
 /// Double of the WGSL struct `Inertia`.
@@ -239,6 +252,7 @@ macro_rules! stored {
 
 stored! {
     Body as BodyRow { Vec3: v, w, dp; Quat: dq; [] }
+    Damping as DampingRow { Vec3: linear_gain, angular_gain; [linear_loss, angular_loss] }
     Inertia as InertiaRow { Vec3: principal, inv_principal; Quat: frame; [] }
     Contact as ContactRow { Vec3: normal, tangent; [friction, restitution, radius_a, radius_b, preload] }
     Point as PointRow {

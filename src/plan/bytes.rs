@@ -6,8 +6,8 @@ use super::{Kernel, Pass, StepPlan};
 use crate::config::FrictionRule;
 use crate::kernels::momentum::{IMPULSES_PER_CHUNK, StepLength};
 use crate::problem::{
-    AxisRow, BodyRow, ContactRow, ContactSummary, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow,
-    JointRow, MassRow, PointRow, StepProblem, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ContactSummary, ConvergenceRow, DampingRow, FreeRow, ImpulseRow, InertiaRow,
+    JointImpulseRow, JointRow, MassRow, PointRow, StepProblem, TorqueRow, TurningRow,
 };
 
 impl StepPlan {
@@ -55,6 +55,10 @@ impl Pass {
             Kernel::IntegrateTorques { from_start } => {
                 let free = if from_start { 0 } else { size_of::<FreeRow>() };
                 rows.len() * (2 * VELOCITIES + size_of::<TorqueRow>() + free)
+            }
+            Kernel::DampVelocities { from_start } => {
+                let free = size_of::<FreeRow>() * if from_start { 1 } else { 2 };
+                rows.len() * (2 * VELOCITIES + size_of::<DampingRow>() + free)
             }
             Kernel::IntegrateGyroscopic { .. } => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
             Kernel::TurnInertias => rows.len() * (size_of::<TurningRow>() + BODY / 2 + MASS),

@@ -25,6 +25,11 @@ pub enum Kernel {
         /// Like in `IntegrateVelocities`.
         from_start: bool,
     },
+    /// Decay of velocities; over bodies.
+    DampVelocities {
+        /// As of `IntegrateVelocities`.
+        from_start: bool,
+    },
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic {
         /// Like in `IntegrateVelocities`.
@@ -99,6 +104,7 @@ impl Kernel {
             Self::BeginChanges => "begin_changes",
             Self::EndChanges => "end_changes",
             Self::IntegrateTorques { .. } => "integrate_torques",
+            Self::DampVelocities { .. } => "damp_velocities",
             Self::IntegrateGyroscopic { .. } => "integrate_gyroscopic",
             Self::ClearImpulses => "clear_impulses",
             Self::SumImpulses { .. } => "sum_impulses",
@@ -130,6 +136,7 @@ impl Kernel {
                 | Self::BeginChanges
                 | Self::EndChanges
                 | Self::IntegrateTorques { .. }
+                | Self::DampVelocities { .. }
                 | Self::IntegrateGyroscopic { .. }
                 | Self::IntegratePositions { .. }
                 | Self::TurnInertias
@@ -163,6 +170,7 @@ impl Kernel {
         match self {
             Self::IntegrateVelocities { from_start, .. }
             | Self::IntegrateTorques { from_start }
+            | Self::DampVelocities { from_start }
             | Self::IntegrateGyroscopic { from_start }
             | Self::IntegratePositions { from_start } => from_start,
             _ => self.rules().is_some_and(|rules| rules.from_start),

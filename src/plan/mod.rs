@@ -2,7 +2,7 @@
 //!
 //! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm is here
 //! and nowhere else. A plan has no pass for a feature that its scene lacks. Without friction no kernel has friction,
-//! and without restitution, torques, unequal moments of inertia or joints there are no passes for them.
+//! and without restitution, torques, damping, unequal moments of inertia or joints there are no passes for them.
 
 mod bytes;
 mod kernel;
@@ -86,12 +86,23 @@ pub(crate) struct PlanKey {
     /// inertia in each step.
     isotropic: Vec<bool>,
     has_torques: bool,
+    has_dampings: bool,
     /// Whether joints have axes, and whether any axis is a limit or a drive.
     axes: bool,
     swept_axes: bool,
 }
 
-crate::saved::cloned!(PlanKey { colors, blocks, totals, joint_totals, isotropic, has_torques, axes, swept_axes });
+crate::saved::cloned!(PlanKey {
+    colors,
+    blocks,
+    totals,
+    joint_totals,
+    isotropic,
+    has_torques,
+    has_dampings,
+    axes,
+    swept_axes
+});
 
 impl PlanKey {
     /// Whether this is the key of the plan of a problem.
@@ -99,6 +110,7 @@ impl PlanKey {
         self.blocks == problem.blocks
             && self.colors == problem.colors
             && self.has_torques != problem.torques.is_empty()
+            && self.has_dampings != problem.dampings.is_empty()
             && self.totals != problem.totals.is_empty()
             && self.joint_totals != problem.joint_totals.is_empty()
             && self.axes != problem.axes.is_empty()
@@ -116,6 +128,7 @@ impl PlanKey {
             joint_totals: !problem.joint_totals.is_empty(),
             isotropic,
             has_torques: !problem.torques.is_empty(),
+            has_dampings: !problem.dampings.is_empty(),
             axes: !problem.axes.is_empty(),
             swept_axes: problem.has_swept_axes(),
         }
@@ -224,6 +237,9 @@ impl StepPlan {
             self.over_colors(Kernel::IntegrateVelocities { warm_start, from_start }, block, bodies);
             if !problem.torques.is_empty() {
                 self.over_colors(Kernel::IntegrateTorques { from_start }, block, bodies);
+            }
+            if !problem.dampings.is_empty() {
+                self.over_colors(Kernel::DampVelocities { from_start }, block, bodies);
             }
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);

@@ -37,7 +37,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
     let state = |(i, b): (usize, &Body)| {
         let moves = b.kind != BodyKind::Fixed && !rests(i);
         let velocity = |v: Vec3| if moves { v.to_array() } else { [0.0; 3] };
-        BodyRow { v: velocity(b.linear_velocity), w: velocity(b.angular_velocity), ..BodyRow::AT_REST }
+        BodyRow { v: velocity(b.linear_velocity), w: velocity(b.allowed_spin(b.angular_velocity)), ..BodyRow::AT_REST }
     };
     world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(state).collect_into_vec(&mut problem.bodies);
     let has_torques = AtomicBool::new(false);
@@ -59,14 +59,14 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
             if b.kind != BodyKind::Dynamic || rests(i) || b.whole_torque() == Vec3::ZERO {
                 return TorqueRow::NONE;
             }
-            let angular_acceleration = b.mass.world_inverse_inertia(b.rotation) * b.whole_torque();
+            let angular_acceleration = b.world_inverse_inertia() * b.whole_torque();
             TorqueRow { angular_acceleration: angular_acceleration.to_array(), ..TorqueRow::NONE }
         };
         problem.torques.extend(world.bodies.iter().enumerate().map(torque));
     }
     problem.inertias.clear();
     if config.gyroscopic {
-        let turns = |b: &Body| b.kind == BodyKind::Dynamic && b.mass.is_anisotropic();
+        let turns = |b: &Body| b.kind == BodyKind::Dynamic && b.mass.is_anisotropic() && !b.has_locked_rotation();
         let row = |(i, b): (usize, &Body)| {
             let unit = b.mass.principal_inertia.max_element().inverse_power();
             let principal = b.mass.principal_inertia * unit;
@@ -84,7 +84,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
 
 /// How hard a body is to move that can be pushed.
 pub(super) fn mass_row(body: &Body) -> MassRow {
-    let i = body.mass.world_inverse_inertia(body.rotation);
+    let i = body.world_inverse_inertia();
     MassRow {
         inv_inertia_x: [i.x_axis.x, i.x_axis.y, i.x_axis.z],
         inv_inertia_yz: [i.y_axis.y, i.y_axis.z, i.z_axis.z],
@@ -103,9 +103,11 @@ pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
         }
         body.forget_applied_forces();
         let center = body.center_of_mass() + Vec3::from_array(row.dp);
-        body.rotation = unit(product(Quat::from_array(row.dq), body.rotation));
+        if !body.has_locked_rotation() || body.locked_rotations != [true; 3] {
+            body.rotation = unit(product(Quat::from_array(row.dq), body.rotation));
+        }
         body.position = center - body.rotation * body.mass.center;
         body.linear_velocity = Vec3::from_array(row.v);
-        body.angular_velocity = Vec3::from_array(row.w);
+        body.angular_velocity = body.allowed_spin(Vec3::from_array(row.w));
     });
 }

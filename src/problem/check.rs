@@ -75,9 +75,11 @@ impl StepProblem {
                 return refuse(format_args!("{name}: {rows}, but {wanted} {of}"));
             }
         }
-        let (torques, bodies) = (self.torques.len(), self.bodies.len());
-        if torques > 0 && torques != bodies {
-            return refuse(format_args!("torques: {torques}, but {bodies} bodies"));
+        let bodies = self.bodies.len();
+        for (name, rows) in [("torques", self.torques.len()), ("dampings", self.dampings.len())] {
+            if rows > 0 && rows != bodies {
+                return refuse(format_args!("{name}: {rows}, but {bodies} bodies"));
+            }
         }
         Ok(())
     }

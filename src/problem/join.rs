@@ -18,6 +18,7 @@ pub(crate) struct Alike {
     restitution: bool,
     round: bool,
     torques: bool,
+    dampings: bool,
     totals: bool,
     joint_totals: bool,
     axes: bool,
@@ -44,6 +45,7 @@ impl Alike {
             restitution,
             round,
             torques: !problem.torques.is_empty(),
+            dampings: !problem.dampings.is_empty(),
             totals: !problem.totals.is_empty(),
             joint_totals: !problem.joint_totals.is_empty(),
             axes: !problem.axes.is_empty(),
@@ -167,6 +169,7 @@ fn clear(all: &mut StepProblem) {
         bodies,
         masses,
         torques,
+        dampings,
         inertias,
         contacts,
         points,
@@ -189,6 +192,7 @@ fn clear(all: &mut StepProblem) {
     bodies.clear();
     masses.clear();
     torques.clear();
+    dampings.clear();
     inertias.clear();
     contacts.clear();
     points.clear();
@@ -224,6 +228,7 @@ fn push_rows(one: &StepProblem, begin: Begin, all: &mut StepProblem) {
     all.bodies.extend_from_slice(&one.bodies);
     all.masses.extend_from_slice(&one.masses);
     all.torques.extend_from_slice(&one.torques);
+    all.dampings.extend_from_slice(&one.dampings);
     all.points.extend_from_slice(&one.points);
     all.impulses.extend_from_slice(&one.impulses);
     all.totals.extend_from_slice(&one.totals);

@@ -80,7 +80,7 @@ fn gap_of_joint(joint: &Joint, weight: Vec4, world: &World, omega: f32) -> f32 {
 
 /// The inverse inertia of a body about an axis across a direction: the mean of two axes (1/(kg m²)).
 fn turn_across(body: &Body, direction: Vec3) -> f32 {
-    let i: Mat3 = body.mass.world_inverse_inertia(body.rotation);
+    let i: Mat3 = body.world_inverse_inertia();
     let along = direction.normalize_or_zero();
     0.5 * (i.x_axis.x + i.y_axis.y + i.z_axis.z - along.dot(i * along))
 }

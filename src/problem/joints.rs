@@ -386,6 +386,8 @@ impl JointRows {
         let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
         let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
         lend_inertia(direct.map(|joint| (joint, substep * self.shares[joint])), &mut self.lent, problem);
+        // The axes that a body does not turn about are those of the world.
+        problem.turning.retain(|row| !world.bodies[row.body as usize].has_locked_rotation());
         // The world, as a body that nothing moves.
         if world.joints.iter().any(|j| j.body_b.is_none()) {
             problem.bodies.push(BodyRow::AT_REST);

@@ -8,6 +8,7 @@ pub mod carry;
 mod check;
 mod check_systems;
 mod contacts;
+pub(crate) mod damping;
 pub mod effective;
 pub(crate) mod join;
 mod joint_loads;
@@ -29,14 +30,16 @@ pub(crate) use axes::drive_count;
 pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
 pub use contacts::ContactRows;
+pub use damping::write_dampings;
 pub(crate) use effective::InverseMass;
 pub use joint_systems::{BlockRow, ImpulseNumber, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
 pub use rows::{
-    AxisRow, BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,
-    MOST_AXES, MassRow, MomentumRow, NO_LIMIT, Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ConvergenceRow, DampingRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow,
+    JointRow, MOST_AXES, MassRow, MomentumRow, NO_LIMIT, Params, PassRow, PointRow, Softness, Substep, TorqueRow,
+    TurningRow,
 };
 pub use summary::ContactSummary;
 pub use touching::{Approach, ColliderPair};
@@ -74,6 +77,8 @@ pub struct StepProblem {
     pub masses: Vec<MassRow>,
     /// Angular accelerations by torques, one row a body; empty where no body has a torque.
     pub torques: Vec<TorqueRow>,
+    /// What damping does, one row a body; empty where no body is damped.
+    pub dampings: Vec<DampingRow>,
     /// Principal inertia of the bodies whose moments differ; empty where the scene has none.
     pub inertias: Vec<InertiaRow>,
     /// Manifolds, in slots that they keep as long as they last. Only those in `order` take part.
@@ -116,6 +121,7 @@ crate::saved::cloned!(StepProblem {
     bodies,
     masses,
     torques,
+    dampings,
     inertias,
     contacts,
     points,
@@ -147,6 +153,7 @@ impl Saved for StepProblem {
             bodies: _,
             masses: _,
             torques: _,
+            dampings: _,
             inertias: _,
             contacts: _,
             points: _,

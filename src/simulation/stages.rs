@@ -16,7 +16,7 @@ use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{Body, BodyKind, MassProperties, Material, World};
+use crate::world::{Body, BodyKind, Surface, World};
 
 /// Everything that a step passes to the next one, except the data on a device.
 pub(super) struct Stages {
@@ -71,7 +71,7 @@ crate::saved::cloned!(Stages {
 struct Key {
     config: SolverConfig,
     /// One entry for each body.
-    surfaces: Vec<(MassProperties, Material)>,
+    surfaces: Vec<Surface>,
     /// Scale of impulses and preloads, or `None` before the first step.
     scale: Option<StepScale>,
 }
@@ -87,7 +87,7 @@ impl Saved for Key {
         let Self { config, surfaces, scale } = self;
         config.walk(archive)?;
         let bodies = archive.count(surfaces.len())?;
-        surfaces.resize(bodies, (MassProperties::IMMOVABLE, Material::default()));
+        surfaces.resize(bodies, Surface::blank());
         archive.runs(bodies, |i, archive| surfaces[i].walk(archive))?;
         scale.walk(archive)
     }
@@ -99,7 +99,7 @@ pub(super) struct Changes {
     /// Bodies that were added or removed, or that changed kind, groups or shapes, in ascending order.
     bodies: Vec<usize>,
     settings: bool,
-    /// Whether masses or materials changed.
+    /// Whether masses, locked axes or materials changed.
     surfaces: bool,
     joints: bool,
     /// Whether the length of a substep or the stiffness of contacts changed.
@@ -120,7 +120,7 @@ impl Changes {
 
 impl Stages {
     pub fn new(world: &World, config: &SolverConfig) -> Self {
-        let surfaces = world.bodies.iter().map(|b| (b.mass, b.material)).collect();
+        let surfaces = world.bodies.iter().map(Body::surface).collect();
         Self {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
@@ -200,7 +200,7 @@ impl Stages {
         bodies.iter().try_for_each(|&i| world.check_body(i))?;
         let is_new = |i: usize| bodies.binary_search(&i).is_ok();
         let mut known = world.bodies.iter().zip(&self.key.surfaces).enumerate();
-        let surfaces = known.any(|(i, (b, known))| (b.mass, b.material) != *known && !is_new(i));
+        let surfaces = known.any(|(i, (b, known))| b.surface() != *known && !is_new(i));
         let joints = !self.joints.are_of(world) || !bodies.is_empty() && !world.joints.is_empty();
         world.check_gravity()?;
         if surfaces {
@@ -230,8 +230,8 @@ impl Stages {
         }
         if changes.surfaces {
             for (i, (known, body)) in self.key.surfaces.iter_mut().zip(&world.bodies).enumerate() {
-                if *known != (body.mass, body.material) {
-                    *known = (body.mass, body.material);
+                if *known != body.surface() {
+                    *known = body.surface();
                     self.sleep.disturb(i);
                 }
             }
@@ -264,9 +264,9 @@ impl Stages {
         self.effort.follow_bodies(world, changed);
         self.energy.follow_bodies(world, changed);
         self.contacts.follow_bodies(world, changed);
-        self.key.surfaces.resize(world.bodies.len(), (MassProperties::IMMOVABLE, Material::default()));
+        self.key.surfaces.resize(world.bodies.len(), Surface::blank());
         for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
-            self.key.surfaces[i] = (world.bodies[i].mass, world.bodies[i].material);
+            self.key.surfaces[i] = world.bodies[i].surface();
         }
         self.plan_key = None;
     }
@@ -335,6 +335,7 @@ impl Stages {
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
+            problem::write_dampings(world, sleep.asleep(), problem);
             let is_planned = self.plan_key.as_ref().is_some_and(|key| key.is_of(problem));
             if found.computed > 0 || found.reshaped || !is_planned {
                 let swept = ContactSummary::of(problem);

@@ -1,9 +1,9 @@
 //! One rigid body: pose, velocity, mass, colliders, material.
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec3, Mat3, Quat, Vec3};
 
 use super::groups::Groups;
-use super::limits::{MOST_GRAVITY, MOST_SPEED, check_place, check_rotation, is_within};
+use super::limits::{MOST_DAMPING, MOST_GRAVITY, MOST_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::Shape;
 use crate::error::{Result, ensure, input};
@@ -169,6 +169,19 @@ pub struct Body {
     /// Scales the gravity of the world for this body: 1 by default, 0 floats, -1 rises as fast as other bodies fall.
     /// Only dynamic bodies feel gravity.
     pub gravity_scale: f32,
+    /// Rate at which the linear velocity decays (1/s), 0 or more. Without forces the velocity is v exp(-d t) after the
+    /// time t, for any number of substeps, and a falling body reaches the speed g/d. Only for dynamic bodies; 0 by
+    /// default.
+    pub linear_damping: f32,
+    /// Rate at which the angular velocity decays (1/s), 0 or more, likewise.
+    pub angular_damping: f32,
+    /// The world axes x, y, z about which the body does not rotate. The next step removes any angular velocity about
+    /// them. About the other axes the body rotates as on bearings, by its inertia about those axes, and without
+    /// gyroscopic torque. Only for dynamic bodies; no axis is locked by default.
+    pub locked_rotations: [bool; 3],
+    /// Whether the body may fall asleep; true by default. A body that may not sleep keeps all bodies awake that touch it
+    /// or are joined to it. Only for dynamic bodies.
+    pub can_sleep: bool,
     /// Mass, center of mass and inertia; zero unless the body is dynamic. A later change of [`Self::colliders`] or
     /// [`Self::kind`] does not change them: call [`Self::update_mass`]. A simulation raises a moment of inertia that is
     /// less than 1/32 of the mass times the squared lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
@@ -183,6 +196,8 @@ pub struct Body {
     /// [`Self::update_mass`].
     pub colliders: Vec<Collider>,
     weight: Weight,
+    /// Mass added to the mass of the shapes.
+    additional: MassProperties,
     /// Force and torque for the next step only.
     pub(super) applied_force: Vec3,
     pub(super) applied_torque: Vec3,
@@ -198,15 +213,30 @@ crate::saved::cloned!(Body {
     force,
     torque,
     gravity_scale,
+    linear_damping,
+    angular_damping,
+    locked_rotations,
+    can_sleep,
     mass,
     material,
     groups,
     swept,
     colliders,
     weight,
+    additional,
     applied_force,
     applied_torque,
 });
+
+/// The properties of a body for which the rows of its contacts were written, in addition to its shapes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Surface {
+    pub mass: MassProperties,
+    pub locked_rotations: [bool; 3],
+    pub material: Material,
+}
+
+crate::saved::fields!(Surface { mass, locked_rotations, material });
 
 /// Where the mass of a body comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -269,12 +299,17 @@ impl Body {
             force,
             torque,
             gravity_scale,
+            linear_damping,
+            angular_damping,
+            locked_rotations,
+            can_sleep,
             mass,
             material,
             groups,
             swept,
             colliders,
             weight,
+            additional,
             applied_force,
             applied_torque,
         } = self;
@@ -284,12 +319,17 @@ impl Body {
             load.walk(archive)?;
         }
         gravity_scale.walk(archive)?;
+        linear_damping.walk(archive)?;
+        angular_damping.walk(archive)?;
+        locked_rotations.walk(archive)?;
+        can_sleep.walk(archive)?;
         mass.walk(archive)?;
         material.walk(archive)?;
         groups.walk(archive)?;
         swept.walk(archive)?;
         colliders.walk(archive)?;
-        weight.walk(archive)
+        weight.walk(archive)?;
+        additional.walk(archive)
     }
 
     /// A body of this kind, without shapes.
@@ -304,12 +344,17 @@ impl Body {
             force: Vec3::ZERO,
             torque: Vec3::ZERO,
             gravity_scale: 1.0,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+            locked_rotations: [false; 3],
+            can_sleep: true,
             mass: MassProperties::IMMOVABLE,
             material: Material::default(),
             groups: Groups::ALL,
             swept: false,
             colliders: Vec::new(),
             weight: Weight::Density(1000.0),
+            additional: MassProperties::IMMOVABLE,
             applied_force: Vec3::ZERO,
             applied_torque: Vec3::ZERO,
         }
@@ -402,6 +447,24 @@ impl Body {
         self.weighing(Weight::Total(mass))
     }
 
+    /// Mass that is added to that of the shapes, with its center and inertia in the body's frame; [`MassProperties::point`] is a point mass. A second
+    /// call takes the place of the first. It adds nothing where [`Self::mass_properties`] gives the mass of the whole body.
+    ///
+    /// ```
+    /// use drystone::{Body, MassProperties, Shape, glam::Vec3};
+    ///
+    /// // A cube of 6 kg and 1 kg m², with as much again 2 m above its center.
+    /// let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0);
+    /// let tall = cube.additional_mass(MassProperties::point(6.0, Vec3::Y * 2.0)).mass;
+    /// assert_eq!((tall.mass, tall.center), (12.0, Vec3::Y));
+    /// assert!((tall.principal_inertia - Vec3::new(13.0, 1.0, 13.0)).length() < 1e-5);
+    /// ```
+    pub fn additional_mass(mut self, mass: MassProperties) -> Self {
+        self.additional = mass;
+        self.update_mass();
+        self
+    }
+
     fn weighing(mut self, weight: Weight) -> Self {
         self.weight = weight;
         self.update_mass();
@@ -448,6 +511,54 @@ impl Body {
         self
     }
 
+    /// Sets the rate at which the linear velocity decays (1/s), 0 or more: [the field](Body#structfield.linear_damping).
+    ///
+    /// ```
+    /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    /// let ball = Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X, Vec3::Y).linear_damping(2.0).angular_damping(1.0);
+    /// let ball = world.insert(ball);
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.step(0.5)?;
+    /// let ball = simulation.world.body(ball).expect("still there");
+    /// assert!((ball.linear_velocity.x - (-1.0_f32).exp()).abs() < 1e-6);
+    /// assert!((ball.angular_velocity.y - (-0.5_f32).exp()).abs() < 1e-6);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn linear_damping(mut self, rate: f32) -> Self {
+        self.linear_damping = rate;
+        self
+    }
+
+    /// Sets the rate at which the angular velocity decays (1/s), 0 or more.
+    pub fn angular_damping(mut self, rate: f32) -> Self {
+        self.angular_damping = rate;
+        self
+    }
+
+    /// Locks rotation about some world axes: x, y, z. See [the field](Body#structfield.locked_rotations).
+    ///
+    /// ```
+    /// use drystone::{Body, Shape, glam::{Mat3, Vec3}};
+    /// let walker = Body::dynamic().shape(Shape::capsule(0.5, 0.3)).locked_rotations([true; 3]).can_sleep(false);
+    /// assert!(!walker.can_sleep);
+    /// assert_eq!(walker.world_inverse_inertia(), Mat3::ZERO);
+    /// // A body in the plane of x and y rotates about z.
+    /// let mut flat = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0).locked_rotations([true, true, false]);
+    /// flat.apply_angular_impulse(Vec3::ONE);
+    /// assert_eq!(flat.angular_velocity, Vec3::Z);
+    /// ```
+    pub fn locked_rotations(mut self, axes: [bool; 3]) -> Self {
+        self.locked_rotations = axes;
+        self
+    }
+
+    /// Sets whether the body may fall asleep: [the field](Body#structfield.can_sleep).
+    pub fn can_sleep(mut self, can: bool) -> Self {
+        self.can_sleep = can;
+        self
+    }
+
     /// Sets the Coulomb friction coefficient, 0 or more.
     pub fn friction(mut self, friction: f32) -> Self {
         self.material.friction = friction;
@@ -488,7 +599,8 @@ impl Body {
         self
     }
 
-    /// Recomputes mass, center of mass and inertia from the present shapes, at the density or total mass that was set.
+    /// Recomputes mass, center of mass and inertia from the present shapes, at the density or total mass that was set,
+    /// and from the [additional mass](Self::additional_mass).
     /// Call it after a change of [`colliders`](Self::colliders) or [`kind`](Self::kind). It has no effect if
     /// [`Self::mass_properties`] set the mass, or if the body is not dynamic.
     ///
@@ -506,12 +618,13 @@ impl Body {
         }
         let solids: Vec<&Collider> = self.solids().filter(|c| c.shape.has_volume()).collect();
         let at = |density: f32| MassProperties::of_solids(&solids, density);
-        self.mass = match self.weight {
+        let own = match self.weight {
             Weight::Density(density) => at(density),
             Weight::Total(mass) if !solids.is_empty() => at(mass / at(1.0).mass),
             Weight::Total(_) => MassProperties::IMMOVABLE,
             Weight::Given => return,
         };
+        self.mass = own.plus(&self.additional);
     }
 
     /// Refuses a mass that no dynamic body can have. The message names the source of the mass.
@@ -544,17 +657,25 @@ impl Body {
             force: _,
             torque: _,
             gravity_scale,
+            linear_damping,
+            angular_damping,
+            locked_rotations,
+            can_sleep,
             mass,
             material,
             groups,
             swept,
             colliders: _,
             weight,
+            additional,
             applied_force: _,
             applied_torque: _,
         } = self;
         (name, kind, mass, gravity_scale) == (&other.name, &other.kind, &other.mass, &other.gravity_scale)
+            && (linear_damping, angular_damping) == (&other.linear_damping, &other.angular_damping)
+            && (locked_rotations, can_sleep) == (&other.locked_rotations, &other.can_sleep)
             && (material, groups, swept, weight) == (&other.material, &other.groups, &other.swept, &other.weight)
+            && *additional == other.additional
             && self.has_same_colliders(other)
     }
 
@@ -565,6 +686,56 @@ impl Body {
             shape.is(&b.shape) && (position, rotation, sensor) == (&b.position, &b.rotation, &b.sensor)
         };
         self.colliders.len() == other.colliders.len() && self.colliders.iter().zip(&other.colliders).all(same)
+    }
+
+    /// Whether damping slows the body.
+    pub(crate) fn is_damped(&self) -> bool {
+        self.kind == BodyKind::Dynamic && (self.linear_damping > 0.0 || self.angular_damping > 0.0)
+    }
+
+    /// Whether rotation about a world axis is locked.
+    pub(crate) fn has_locked_rotation(&self) -> bool {
+        self.kind == BodyKind::Dynamic && self.locked_rotations != [false; 3]
+    }
+
+    /// The part of an angular velocity about the axes that are not locked.
+    pub(crate) fn allowed_spin(&self, spin: Vec3) -> Vec3 {
+        if !self.has_locked_rotation() {
+            return spin;
+        }
+        let [x, y, z] = self.locked_rotations;
+        Vec3::select(glam::BVec3::new(x, y, z), Vec3::ZERO, spin)
+    }
+
+    /// The properties for which its rows are written, in addition to its shapes.
+    pub(crate) fn surface(&self) -> Surface {
+        Surface { mass: self.mass, locked_rotations: self.locked_rotations, material: self.material }
+    }
+
+    /// Inverse inertia in world axes (1/(kg m²)): the inverse of the inertia about the axes that are not locked, and zero
+    /// about the locked ones. Zero unless the body is dynamic.
+    pub fn world_inverse_inertia(&self) -> Mat3 {
+        if !self.has_locked_rotation() {
+            return self.mass.world_inverse_inertia(self.rotation);
+        }
+        let size = f64::from(self.mass.principal_inertia.max_element());
+        if self.locked_rotations == [true; 3] || size <= 0.0 {
+            return Mat3::ZERO;
+        }
+        // By their size, so that no product leaves the range of numbers. A locked axis is put apart from the others.
+        let mut inertia = self.mass.world_inertia(self.rotation).as_dmat3() * size.recip();
+        let locked = (0..3).filter(|&k| self.locked_rotations[k]);
+        for k in locked.clone() {
+            *inertia.col_mut(k) = DVec3::ZERO;
+            (0..3).for_each(|other| inertia.col_mut(other)[k] = 0.0);
+            inertia.col_mut(k)[k] = 1.0;
+        }
+        let mut inverse = inertia.inverse() * size.recip();
+        for k in locked {
+            *inverse.col_mut(k) = DVec3::ZERO;
+            (0..3).for_each(|other| inverse.col_mut(other)[k] = 0.0);
+        }
+        inverse.as_mat3()
     }
 
     /// Whether the body is kinematic and moves.
@@ -619,7 +790,7 @@ impl Body {
     /// Changes the angular velocity at once, by an angular impulse in world axes (N m s).
     pub fn apply_angular_impulse(&mut self, impulse: Vec3) {
         if self.kind == BodyKind::Dynamic {
-            self.angular_velocity += self.mass.world_inverse_inertia(self.rotation) * impulse;
+            self.angular_velocity += self.world_inverse_inertia() * impulse;
         }
     }
 
@@ -711,7 +882,7 @@ impl Body {
         self.check_surface()
     }
 
-    /// Refuses a pose, velocity, force, torque or gravity scale that is out of range.
+    /// Refuses a pose, velocity, force, torque, damping or gravity scale that is out of range.
     pub(crate) fn check_motion(&self) -> Result<()> {
         check_place("position", self.position)?;
         check_rotation("rotation", self.rotation)?;
@@ -721,7 +892,7 @@ impl Body {
         }
         let loads = [self.whole_force(), self.whole_torque()];
         let accelerations = if loads != [Vec3::ZERO; 2] && self.kind == BodyKind::Dynamic && self.mass.mass > 0.0 {
-            [loads[0] / self.mass.mass, self.mass.world_inverse_inertia(self.rotation) * loads[1]]
+            [loads[0] / self.mass.mass, self.world_inverse_inertia() * loads[1]]
         } else {
             // The product is zero if the load is finite.
             loads.map(|load| 0.0 * load)
@@ -730,6 +901,11 @@ impl Body {
             let message =
                 || format!("{name} = {load}: must accelerate the body by at most {MOST_GRAVITY:e} along every axis");
             ensure(is_within(acceleration, MOST_GRAVITY), message)?;
+        }
+        for (name, rate) in [("linear_damping", self.linear_damping), ("angular_damping", self.angular_damping)] {
+            ensure((0.0..=MOST_DAMPING).contains(&rate), || {
+                format!("{name} = {rate}: must be 0 to {MOST_DAMPING:e} 1/s")
+            })?;
         }
         let scale = self.gravity_scale;
         ensure(scale.abs() <= MOST_GRAVITY, || {
@@ -755,6 +931,7 @@ impl Body {
         let is_friction = friction >= 0.0 && friction.is_finite();
         ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
         ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))?;
+        self.additional.check_additional().map_err(|e| e.within("additional_mass"))?;
         if self.kind == BodyKind::Dynamic { self.check_mass() } else { self.mass.check_frame() }
     }
 

@@ -12,6 +12,8 @@ pub const MOST_SPEED: f32 = 1e9;
 /// Largest acceleration along an axis: by gravity (m/s²), by the force on a body (m/s²), and by the torque on a body
 /// (rad/s²).
 pub const MOST_GRAVITY: f32 = 1e9;
+/// Largest rate of damping (1/s).
+pub const MOST_DAMPING: f32 = 1e9;
 
 /// Whether every coordinate of a point is at most [`MOST_LENGTH`] in size; false for NaN.
 pub(super) fn is_place(point: Vec3) -> bool {

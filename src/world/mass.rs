@@ -60,6 +60,51 @@ impl MassProperties {
     /// solve one point at a time never bring a body to rest (docs/derivation.md, section 3).
     pub const MOST_LEVERAGE: f32 = 32.0;
 
+    /// A mass (kg) at a point of the body's frame (m): without inertia of its own.
+    pub const fn point(mass: f32, center: Vec3) -> Self {
+        Self { mass, center, ..Self::IMMOVABLE }
+    }
+
+    /// Those of two things that are one body: the sum of the masses, their common center, and the inertia of both about it.
+    ///
+    /// ```
+    /// use drystone::{MassProperties, glam::Vec3};
+    ///
+    /// // Two masses at the ends of a light rod of 2 m.
+    /// let [a, b] = [-1.0, 3.0].map(|x| MassProperties::point(if x < 0.0 { 3.0 } else { 1.0 }, Vec3::X * x));
+    /// let both = a.plus(&b);
+    /// assert_eq!((both.mass, both.center, both.principal_inertia), (4.0, Vec3::ZERO, Vec3::new(0.0, 12.0, 12.0)));
+    /// ```
+    pub fn plus(&self, other: &Self) -> Self {
+        if self.mass == 0.0 || other.mass == 0.0 {
+            return if other.mass == 0.0 { *self } else { *other };
+        }
+        let [own, others] = [self, other].map(|one| f64::from(one.mass));
+        let mass = own + others;
+        let center = (self.center.as_dvec3() * own + other.center.as_dvec3() * others) / mass;
+        let about = |one: &Self| {
+            let out = one.center.as_dvec3() - center;
+            tensor(one.principal_inertia, one.principal_frame) + across(out) * f64::from(one.mass)
+        };
+        let sum = about(self) + about(other);
+        let along_axes = DMat3::from_diagonal(diagonal(&sum));
+        let (principal_inertia, principal_frame) =
+            if sum == along_axes { (diagonal(&sum).as_vec3(), Quat::IDENTITY) } else { diagonalized(sum) };
+        Self { mass: mass as f32, center: center.as_vec3(), principal_inertia, principal_frame }
+    }
+
+    /// Refuses a mass that cannot be added to that of shapes.
+    pub(super) fn check_additional(&self) -> Result<()> {
+        let Self { mass, principal_inertia, .. } = *self;
+        let moments = principal_inertia.to_array();
+        let fits = (0.0..=*Self::MASSES.end()).contains(&mass)
+            && moments.iter().all(|i| (0.0..=*Self::MOMENTS.end()).contains(i));
+        ensure(fits, || {
+            format!("mass = {mass:e} kg, inertia = {moments:?} kg m²: must be 0 to 1e15 kg and 0 to 1e30 kg m²")
+        })?;
+        self.check_frame()
+    }
+
     /// Refuses a mass or an inertia that no dynamic body can have.
     pub(crate) fn check(&self) -> Result<()> {
         self.check_frame()?;
@@ -99,9 +144,7 @@ impl MassProperties {
             let axes = axes_of(at.rotation);
             let center = *at * solid.mass.local_com;
             let out = (all.local_com - center).as_dvec3();
-            let across =
-                DMat3::IDENTITY * out.length_squared() - DMat3::from_cols(out * out.x, out * out.y, out * out.z);
-            axes * solid.tensor * axes.transpose() + across * f64::from(solid.mass.mass())
+            axes * solid.tensor * axes.transpose() + across(out) * f64::from(solid.mass.mass())
         };
         let exact = solids.iter().map(own).fold(DMat3::ZERO, |sum, own| sum + own);
         let (moments, frame) = diagonalized(exact);
@@ -180,6 +223,11 @@ fn axes_of(frame: Quat) -> DMat3 {
 fn tensor(moments: Vec3, frame: Quat) -> DMat3 {
     let axes = axes_of(frame);
     axes * DMat3::from_diagonal(moments.as_dvec3()) * axes.transpose()
+}
+
+/// The inertia of a mass of 1 at a point, about the origin.
+fn across(out: DVec3) -> DMat3 {
+    DMat3::IDENTITY * out.length_squared() - DMat3::from_cols(out * out.x, out * out.y, out * out.z)
 }
 
 fn diagonal(tensor: &DMat3) -> DVec3 {

@@ -17,6 +17,7 @@ mod surface;
 mod tag;
 
 pub use bodies::{Bodies, BodyHandle};
+pub(crate) use body::Surface;
 pub use body::{Body, BodyKind, Collider, Material};
 pub(crate) use change::WorldChange;
 pub use groups::Groups;

@@ -76,7 +76,7 @@ fn a_world_has_the_bits_of_the_world_alone() {
     }
 }
 
-/// Sixteen worlds whose steps run as one, in other states each: every scene of the catalogue that is small enough, with torques and listeners in some.
+/// Sixteen worlds whose steps run as one, in other states each: every scene of the catalogue that is small enough, with torques, damping and listeners in some.
 #[test]
 fn worlds_that_run_as_one_have_the_bits_of_each_alone() {
     let listen = Listen { contacts: true, ..Listen::default() };
@@ -87,6 +87,9 @@ fn worlds_that_run_as_one_have_the_bits_of_each_alone() {
         bodies.bodies[body].apply_impulse(Vec3::new(push, 0.5 * push, -0.3 * push));
         if world % 5 == 4 {
             bodies.bodies[body].torque = Vec3::new(0.0, push, 0.1 * push);
+        }
+        if world % 5 == 2 {
+            (bodies.bodies[body].linear_damping, bodies.bodies[body].angular_damping) = (0.3, 0.1 * world as f32);
         }
     };
     let mut tried = 0;

@@ -3,7 +3,7 @@
 use crate::common::settings::set;
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::plan::{Kernel, Pass};
-use drystone::stages::problem::{AxisRow, InertiaRow, JointImpulseRow, TorqueRow};
+use drystone::stages::problem::{AxisRow, DampingRow, InertiaRow, JointImpulseRow, TorqueRow};
 use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
 
 /// The problem of a step with contacts, joints and spins, and its plan.
@@ -112,7 +112,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
     assert_eq!(refusal(problem.clone(), &plan.passes), None);
     let bodies = problem.bodies.len() as u32;
     type Break = fn(&mut StepProblem, u32);
-    let cases: [(&str, Break); 43] = [
+    let cases: [(&str, Break); 44] = [
         ("masses: ", |p, _| p.masses.truncate(1)),
         ("impulses: ", |p, _| p.impulses.truncate(1)),
         ("joint_impulses: ", |p, _| p.joint_impulses.clear()),
@@ -140,6 +140,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("joints[0]: bodies", |p, n| p.joints[0].body_a = n),
         ("joints[1]: bodies", |p, n| p.joints[1].body_b = n),
         ("torques: 1, but", |p, _| p.torques.push(TorqueRow::NONE)),
+        ("dampings: 1, but", |p, _| p.dampings.push(DampingRow::default())),
         ("inertias[0]: body", |p, n| p.inertias[0].body = n),
         ("inertias[1]: body", |p, _| p.inertias[1] = InertiaRow { ..p.inertias[0] }),
         ("contacts[0].point_count = 0", |p, _| p.contacts[0].point_count = 0),

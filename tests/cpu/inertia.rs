@@ -179,3 +179,40 @@ fn a_box_has_its_inertia_along_every_axis_and_at_every_size() {
         }
     }
 }
+
+/// A mass that is added as numbers is the same as one that is added as a shape, wherever it is and however it is turned.
+#[test]
+fn additional_mass_is_that_of_a_shape_there() {
+    let (at, turned) = (Vec3::new(0.3, -0.8, 0.5), Quat::from_scaled_axis(Vec3::new(0.4, 1.1, -0.2)));
+    let (cube, board) = (Shape::cuboid(0.5, 0.4, 0.3), Shape::cuboid(0.6, 0.1, 0.2));
+    let both = Body::dynamic().shape(cube.clone()).shape_at(board.clone(), at, turned).mass;
+    let alone = Body::dynamic().shape(board).mass;
+    let frame = turned * alone.principal_frame;
+    let added = MassProperties { center: at, principal_frame: frame, ..alone };
+    let sum = Body::dynamic().additional_mass(added).shape(cube).mass;
+    assert!((sum.mass - both.mass).abs() < 1e-6 * both.mass && (sum.center - both.center).length() < 1e-6);
+    let difference = sum.world_inertia(Quat::IDENTITY) - both.world_inertia(Quat::IDENTITY);
+    let largest = difference.to_cols_array().into_iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+    assert!(largest < 1e-5 * both.principal_inertia.max_element(), "{difference}");
+}
+
+/// A second mass takes the place of the first, nothing changes what is given as a whole, and what no mass can be is refused by its name.
+#[test]
+fn additional_mass_is_added_once() {
+    let cube = || Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0);
+    let point = |mass: f32| MassProperties::point(mass, Vec3::Y);
+    let body = cube().additional_mass(point(4.0)).additional_mass(point(2.0));
+    assert_eq!((body.mass.mass, body.mass.center), (8.0, Vec3::Y * 0.25));
+    let mut again = body.clone();
+    again.update_mass();
+    assert_eq!(again.mass, body.mass);
+    assert_eq!(cube().additional_mass(point(0.0)).mass, cube().mass);
+    let given = cube().mass;
+    assert_eq!(cube().mass_properties(given).additional_mass(point(3.0)).mass, given);
+    for (mass, line) in [(-1.0, "additional_mass: mass = -1e0 kg"), (f32::NAN, "additional_mass: mass = NaN kg")] {
+        let mut world = World::new();
+        world.add(cube().additional_mass(point(mass)));
+        let error = world.check().expect_err("no mass").to_string();
+        assert!(error.contains(line) && !error.contains('\n'), "{error}");
+    }
+}

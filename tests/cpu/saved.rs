@@ -100,6 +100,35 @@ fn bodies_that_the_caller_drives_go_on_to_the_same_bits() {
     goes_on("drum", &scene("drum", &[]), &SolverConfig::default(), 60, &[7, 40], unchanged);
 }
 
+/// Damping that came while the run went on is in its state, and in the next steps of all that go on from it.
+#[test]
+fn damped_bodies_go_on_to_the_same_bits() {
+    let damp = |step: u32, world: &mut World| {
+        if step == 12 {
+            let of = |(k, body): (usize, &mut Body)| {
+                (body.linear_damping, body.angular_damping) = (0.1 * (k % 4) as f32, 0.3 * (k % 3) as f32);
+            };
+            world.bodies.iter_mut().enumerate().for_each(of);
+        }
+    };
+    goes_on("damped", &scene("pile", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40], damp);
+}
+
+/// The same of axes that are locked while the run goes on.
+#[test]
+fn locked_bodies_go_on_to_the_same_bits() {
+    let lock = |step: u32, world: &mut World| {
+        if step == 12 || step == 50 {
+            let of = |(k, body): (usize, &mut Body)| {
+                body.locked_rotations = [k % 2 > 0, k % 3 > 0, step == 12 && k % 5 > 0];
+                body.can_sleep = k % 4 > 0;
+            };
+            world.bodies.iter_mut().enumerate().for_each(of);
+        }
+    };
+    goes_on("locked", &scene("pile-mixed", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40, 50, 51], lock);
+}
+
 #[test]
 fn islands_of_higher_effort_go_on_to_the_same_bits() {
     let world = scene("mass-ratio", &[]);
@@ -285,7 +314,7 @@ fn bytes_that_are_damaged_or_cut_short_are_refused_in_one_line() {
     let mut other = bytes.clone();
     other[8] += 1;
     let line = refusal(&other);
-    assert!(line.contains("version 5") && line.contains("reads 4"), "{line}");
+    assert!(line.contains("version 6") && line.contains("reads 5"), "{line}");
     assert!(refusal(b"a file of another program").contains("these bytes are not a saved run"));
 }
 

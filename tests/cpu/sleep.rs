@@ -56,6 +56,25 @@ fn asleep(simulation: &Simulation, bodies: std::ops::Range<usize>) -> bool {
     count > 0
 }
 
+/// It keeps its island awake and no other, wakes when it may no longer sleep, and sleeps when it may again.
+#[test]
+fn a_body_that_may_not_sleep_keeps_its_island_awake() {
+    let mut world = stacks();
+    world.bodies[2].can_sleep = false;
+    let mut simulation = simulation(world, sleepy());
+    run(&mut simulation, 120);
+    assert!(!asleep(&simulation, 1..4) && asleep(&simulation, 4..7));
+    simulation.world.bodies[2].can_sleep = true;
+    run(&mut simulation, 60);
+    assert!(asleep(&simulation, 1..4));
+    simulation.world.bodies[5].can_sleep = false;
+    run(&mut simulation, 60);
+    assert!(asleep(&simulation, 1..4) && !asleep(&simulation, 4..7));
+    let mut loaded = Simulation::load(&simulation.save(), Box::new(Cpu::new())).expect("what was saved");
+    run(&mut loaded, 60);
+    assert!(asleep(&loaded, 1..4) && !asleep(&loaded, 4..7));
+}
+
 /// A cube 16 mm deep in the floor comes out at 5 mm/s, which is slow enough to sleep: it slept 12 mm deep.
 #[test]
 fn what_still_comes_out_of_another_body_stays_awake() {

@@ -13,6 +13,7 @@ mod breaking;
 mod closed_forms;
 mod conform;
 mod course;
+mod damping;
 mod direct_joints;
 mod events;
 #[cfg(feature = "serde")]
@@ -28,6 +29,7 @@ mod joints;
 mod kernels;
 mod living;
 mod living_random;
+mod locked;
 mod masses;
 mod problems;
 mod resident;
@@ -44,6 +46,7 @@ fn main() -> std::process::ExitCode {
         closed_forms::tests(),
         conform::tests(),
         course::tests(),
+        damping::tests(),
         direct_joints::tests(),
         events::tests(),
         #[cfg(feature = "serde")]
@@ -58,6 +61,7 @@ fn main() -> std::process::ExitCode {
         joints::tests(),
         kernels::tests(),
         living::tests(),
+        locked::tests(),
         living_random::tests(),
         masses::tests(),
         problems::tests(),

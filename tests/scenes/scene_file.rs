@@ -391,6 +391,52 @@ fn what_is_neither_a_scene_nor_a_file_is_met_with_the_nearest_scene() {
     assert!(matches!(Scene::find("piles.json", &[]), Err(Error::File { .. })));
 }
 
+/// Damping, locked axes and sleep of a body, there and back, and one line for each that is amiss.
+#[test]
+fn damping_and_locks_of_a_body_are_keys() {
+    let file = |keys: &str| {
+        format!(
+            r#"{{"version": 1, "bodies": [{{"name": "b", "shapes": [{{"type": "ball", "radius": 0.5}}], {keys}}}]}}"#
+        )
+    };
+    let read = |keys: &str| SceneFile::parse(&file(keys)).and_then(|file| file.into_scene("a"));
+    let keys =
+        r#""linear_damping": 0.5, "angular_damping": 2, "locked_rotations": [true, false, true], "can_sleep": false"#;
+    let scene = read(keys).expect("a scene");
+    let again = SceneFile::parse(&SceneFile::of(&scene).expect("a file").to_text()).expect("its text");
+    for world in [scene.world, again.into_scene("a").expect("a scene").world] {
+        let body = &world.bodies[0];
+        assert_eq!((body.linear_damping, body.angular_damping), (0.5, 2.0));
+        assert_eq!((body.locked_rotations, body.can_sleep), ([true, false, true], false));
+    }
+    let line = |keys: &str| read(keys).expect_err("a refusal").to_string();
+    assert_eq!(line(r#""linear_damping": -1"#), "body 0 \"b\": linear_damping = -1: must be 0 to 1e9 1/s");
+    assert!(line(r#""angular_damping": 1e300"#).starts_with("body 0 \"b\": angular_damping = "));
+    assert!(line(r#""locked_rotations": [1, 0, 0]"#).starts_with("body 0 \"b\": locked_rotations[0]: "));
+}
+
+/// A file says the whole mass of a body that had some added.
+#[test]
+fn additional_mass_of_a_body_is_a_key() {
+    let read = |keys: &str| {
+        let shape = r#"{"type": "cuboid", "half_extents": [0.5, 0.5, 0.5]}"#;
+        let text = format!(r#"{{"version": 1, "bodies": [{{"name": "b", "shapes": [{shape}], {keys}}}]}}"#);
+        SceneFile::parse(&text).and_then(|file| file.into_scene("a"))
+    };
+    let scene = read(r#""mass": 6, "additional_mass": {"mass": 6, "center": [0, 2, 0]}"#).expect("a scene");
+    let again = SceneFile::parse(&SceneFile::of(&scene).expect("a file").to_text()).expect("its text");
+    for world in [scene.world, again.into_scene("a").expect("a scene").world] {
+        let mass = world.bodies[0].mass;
+        assert_eq!((mass.mass, mass.center), (12.0, glam::Vec3::Y));
+        assert!((mass.principal_inertia - glam::Vec3::new(13.0, 1.0, 13.0)).length() < 1e-5);
+    }
+    let line = |keys: &str| read(keys).expect_err("a refusal").to_string();
+    let negative = line(r#""additional_mass": {"mass": 1, "principal_inertia": [1, -1, 1]}"#);
+    assert!(negative.starts_with("body 0 \"b\": additional_mass: principal_inertia = "), "{negative}");
+    let whole = r#""mass_properties": {"mass": 1, "principal_inertia": [1, 1, 1]}, "additional_mass": {"mass": 1}"#;
+    assert_eq!(line(whole), "body 0 \"b\": additional_mass: mass_properties give the whole mass");
+}
+
 #[test]
 fn the_schema_describes_every_key() {
     let schema = schema();
@@ -406,8 +452,8 @@ fn the_schema_describes_every_key() {
     let body = &schema["$defs"]["BodyFile"];
     assert_eq!(
         keys(body),
-        "angular_velocity density force friction gravity_scale groups kind leaves linear_velocity mass mass_properties name \
-         position restitution rotation shapes swept torque"
+        "additional_mass angular_damping angular_velocity can_sleep density force friction gravity_scale groups kind leaves linear_damping linear_velocity locked_rotations mass \
+         mass_properties name position restitution rotation shapes swept torque"
     );
     assert_eq!(keys(&schema["$defs"]["SpawnerFile"]), "body count every first");
     assert_eq!(keys(&schema["$defs"]["LeavesFile"]), "after below");

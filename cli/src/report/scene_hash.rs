@@ -53,6 +53,15 @@ pub fn content_hash(scene: &Scene) -> String {
         if (b.torque, b.gravity_scale) != (drystone::glam::Vec3::ZERO, 1.0) {
             let _ = write!(sink, "{:?} {:?}", b.torque, b.gravity_scale);
         }
+        if (b.linear_damping, b.angular_damping) != (0.0, 0.0) {
+            let _ = write!(sink, "damping {:?} {:?}", b.linear_damping, b.angular_damping);
+        }
+        if b.locked_rotations != [false; 3] {
+            let _ = write!(sink, "locked {:?}", b.locked_rotations);
+        }
+        if !b.can_sleep {
+            let _ = write!(sink, "awake");
+        }
         for c in &b.colliders {
             let _ = write!(sink, "{:?} {:?} {:?}", c.shape.parry().as_typed_shape(), c.position, c.rotation);
             if c.sensor {
@@ -76,12 +85,15 @@ mod tests {
     fn the_hash_sees_what_a_step_sees() {
         let scene = Scene::find("drop", &[]).unwrap();
         assert_eq!(content_hash(&scene), content_hash(&Scene::find("drop", &[]).unwrap()));
-        let changes: [fn(&mut Scene); 9] = [
+        let changes: [fn(&mut Scene); 12] = [
             |s| s.dt *= 0.5,
             |s| s.world.bodies[3].position.x += 1e-6,
             |s| s.world.bodies[3].force.y = 1e-3,
             |s| s.world.bodies[3].torque.y = 1e-3,
             |s| s.world.bodies[3].gravity_scale = 0.5,
+            |s| s.world.bodies[3].angular_damping = 0.5,
+            |s| s.world.bodies[3].locked_rotations[1] = true,
+            |s| s.world.bodies[3].can_sleep = false,
             |s| s.world.own_gravity = vec![Some(drystone::glam::Vec3::X)],
             |s| s.world.bodies[3].material.friction = 0.51,
             |s| s.world.bodies[3].colliders[0].shape = drystone::Shape::ball(0.25),

@@ -5,12 +5,12 @@
 use std::ops::Range;
 
 use crate::kernels::integrate::{
-    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
-    start_of,
+    begin_changes, damp_velocities, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque,
+    integrate_velocities, start_of,
 };
 use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
-use crate::kernels::{Body, Free, Inertia, Mass, StepParams, Sym3};
+use crate::kernels::{Body, Damping, Free, Inertia, Mass, StepParams, Sym3};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Work, lanes};
 use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
@@ -104,6 +104,8 @@ pub(super) struct BodyWork<'a> {
     pub free: Shared<'a, Row8>,
     /// Acceleration, then angular acceleration.
     pub accelerations: &'a [Row8],
+    /// Rows of damping; none where no body is damped.
+    pub dampings: &'a [Row8],
 }
 
 impl Work for BodyWork<'_> {
@@ -117,6 +119,7 @@ impl Work for BodyWork<'_> {
             // SAFETY: `NEIGHBORS` are the places of the sixteen states of the slice.
             let mut body = unsafe { wide_body::<L>(states.as_ptr(), &NEIGHBORS) };
             let accelerations = &self.accelerations[range.clone()];
+            let dampings = self.dampings.get(range.clone());
             // SAFETY: as above.
             let rows = unsafe { self.free.slice(range) };
             // SAFETY: `NEIGHBORING_ROWS` are the places of the sixteen rows of the slice.
@@ -135,6 +138,18 @@ impl Work for BodyWork<'_> {
                     // SAFETY: as above.
                     let [_, _, _, _, x, y, z, _] = unsafe { L::gathered(accelerations.as_ptr(), &NEIGHBORING_ROWS) };
                     integrate_torque(from_start, &params, vec3(x, y, z), &mut body, &mut free);
+                    if !from_start {
+                        rows.copy_from_slice(&velocity_rows(free.v, free.w));
+                    }
+                }
+                Kernel::DampVelocities { from_start } => {
+                    let dampings = dampings.expect("a row of damping for each body");
+                    // SAFETY: as above.
+                    let [x, y, z, linear_loss, turn_x, turn_y, turn_z, angular_loss] =
+                        unsafe { L::gathered(dampings.as_ptr(), &NEIGHBORING_ROWS) };
+                    let (linear_gain, angular_gain) = (vec3(x, y, z), vec3(turn_x, turn_y, turn_z));
+                    let damping = Damping { linear_gain, linear_loss, angular_gain, angular_loss };
+                    damp_velocities(from_start, &damping, &mut body, &mut free);
                     if !from_start {
                         rows.copy_from_slice(&velocity_rows(free.v, free.w));
                     }

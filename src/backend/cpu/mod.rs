@@ -61,6 +61,8 @@ pub struct Cpu {
     bodies: Vec<State>,
     free: Vec<Row8>,
     accelerations: Vec<Row8>,
+    /// Rows of damping; none where no body is damped.
+    dampings: Vec<Row8>,
     /// Unequal moments of inertia, and the slots of their bodies, in the order of slots.
     inertias: Vec<(usize, Inertia<f32>)>,
     contacts: LaneLayout<ContactRow>,
@@ -112,6 +114,13 @@ impl Cpu {
         reset(&mut self.accelerations, len);
         let (bodies, accelerations) = (Shared::new(&mut self.bodies), Shared::new(&mut self.accelerations));
         in_groups(problem.bodies.len(), threads, &|range| load_bodies(problem, slots, range, &bodies, &accelerations));
+        self.dampings.clear();
+        if !problem.dampings.is_empty() {
+            self.dampings.resize(len, Row8::default());
+            for (&slot, row) in slots.iter().zip(&problem.dampings) {
+                self.dampings[slot as usize] = Row8(bytemuck::cast(*row));
+            }
+        }
         self.inertias.clear();
         self.inertias
             .extend(problem.inertias.iter().map(|row| (slots[row.body as usize] as usize, Inertia::load(row))));
@@ -203,6 +212,7 @@ impl Cpu {
             bodies: Shared::new(&mut self.bodies),
             free: Shared::new(&mut self.free),
             accelerations: &self.accelerations,
+            dampings: &self.dampings,
             inertias: &self.inertias,
             contacts: &self.contacts,
             contact_points: self.contact_points.shared(),

@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::kernels::contact::{clear_impulse, sum_impulse, summed};
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{
-    begin_changes, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque, integrate_velocities,
-    start_of,
+    begin_changes, damp_velocities, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque,
+    integrate_velocities, start_of,
 };
 use crate::kernels::joint_system::{JointFactors, SystemRows, begin_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
@@ -97,6 +97,12 @@ impl<S: Scalar> Reference<S> {
                 for i in places(problem, pass) {
                     let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
                     integrate_torque(from_start, &params, self.rows.torques[i], body, free);
+                }
+            }
+            Kernel::DampVelocities { from_start } => {
+                for i in places(problem, pass) {
+                    let (body, free) = (&mut self.rows.bodies[i], &mut self.free[i]);
+                    damp_velocities(from_start, &self.rows.dampings[i], body, free);
                 }
             }
             Kernel::IntegrateGyroscopic { from_start } => {

@@ -25,6 +25,7 @@ pub(super) struct SharedStep<'a> {
     pub bodies: Shared<'a, State>,
     pub free: Shared<'a, Row8>,
     pub accelerations: &'a [Row8],
+    pub dampings: &'a [Row8],
     pub inertias: &'a [(usize, Inertia<f32>)],
     pub contacts: &'a LaneLayout<ContactRow>,
     pub contact_points: SharedPoints<'a>,
@@ -54,11 +55,12 @@ impl SharedStep<'_> {
         match kernel {
             Kernel::IntegrateVelocities { .. }
             | Kernel::IntegrateTorques { .. }
+            | Kernel::DampVelocities { .. }
             | Kernel::BeginChanges
             | Kernel::EndChanges
             | Kernel::IntegratePositions { .. } => {
-                let work =
-                    BodyWork { kernel, params, substep, bodies, free: self.free, accelerations: self.accelerations };
+                let Self { free, accelerations, dampings, .. } = *self;
+                let work = BodyWork { kernel, params, substep, bodies, free, accelerations, dampings };
                 spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
             }
             Kernel::IntegrateGyroscopic { from_start } => {

@@ -50,6 +50,8 @@ bindings! {
     Masses "masses": "array<Mass>", Write;
     /// Angular accelerations of the bodies by torques.
     Torques "torques": "array<Torque>", Read;
+    /// Effects of damping on the bodies.
+    Dampings "dampings": "array<Damping>", Read;
     /// Principal inertia of the bodies with unequal moments.
     Inertias "inertias": "array<Inertia>", Read;
     /// Manifolds.

@@ -35,12 +35,13 @@ pub(super) fn pack_systems(problem: &StepProblem, packed: &mut Vec<u32>) {
 }
 
 /// Rows that change little from step to step.
-pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 14] {
+pub(super) fn small<'a>(problem: &'a StepProblem, colors: &'a [u32], systems: &'a [u32]) -> [(Binding, &'a [u8]); 15] {
     [
         (Binding::Params, bytemuck::bytes_of(&problem.params)),
         (Binding::Bodies, bytemuck::cast_slice(&problem.bodies)),
         (Binding::Masses, bytemuck::cast_slice(&problem.masses)),
         (Binding::Torques, bytemuck::cast_slice(&problem.torques)),
+        (Binding::Dampings, bytemuck::cast_slice(&problem.dampings)),
         (Binding::Inertias, bytemuck::cast_slice(&problem.inertias)),
         (Binding::Colors, bytemuck::cast_slice(colors)),
         (Binding::Joints, bytemuck::cast_slice(&problem.joints)),

@@ -112,6 +112,9 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
         Kernel::IntegrateTorques { from_start } => {
             (&[part!("integrate_torques")], Over::Colors, format!("integrate_torque({from_start}, row)"))
         }
+        Kernel::DampVelocities { from_start } => {
+            (&[part!("damp_velocities")], Over::Colors, format!("damp_velocity({from_start}, row)"))
+        }
         Kernel::IntegrateGyroscopic { from_start } => {
             (&[part!("integrate_gyroscopic")], Over::Colors, format!("turn_spin({from_start}, row)"))
         }

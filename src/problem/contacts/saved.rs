@@ -23,7 +23,7 @@ use crate::effort::Effort;
 use crate::error::{Result, ensure};
 use crate::graph::lay_out;
 use crate::saved::{Archive, Saved};
-use crate::world::{Body, BodyKind, MassProperties, Material, World};
+use crate::world::{Body, BodyKind, Surface, World};
 use loads::{COLUMNS, Rows, SlotLoads, Sources};
 use slots::walk_slots;
 
@@ -62,7 +62,7 @@ impl ContactRows {
         &mut self,
         world: &World,
         detector: &Detector,
-        (config, scale, surfaces): (&SolverConfig, Option<&StepScale>, &[(MassProperties, Material)]),
+        (config, scale, surfaces): (&SolverConfig, Option<&StepScale>, &[Surface]),
         effort: &Effort,
         problem: &mut StepProblem,
         archive: &mut A,
@@ -161,9 +161,7 @@ impl ContactRows {
                 let bodies = [pair.body_a, pair.body_b].map(|body| body as usize);
                 let is_same = |&body: &usize| {
                     let now = world.bodies.get(body);
-                    now.is_some_and(|b| {
-                        surfaces.get(body) == Some(&(b.mass, b.material)) && b.kind == detector.kinds()[body]
-                    })
+                    now.is_some_and(|b| surfaces.get(body) == Some(&b.surface()) && b.kind == detector.kinds()[body])
                 };
                 let turns = |&body: &usize| masses[body].inv_mass > 0.0 && !has_equal_moments(&world.bodies[body]);
                 match all_there && bodies.iter().any(turns) {

@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 
 use super::joint::joint;
 use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
-use super::schema::{BodyFile, Geometry, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
+use super::schema::{AdditionalMassFile, BodyFile, Geometry, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
 use crate::config::check_step_length;
 use crate::error::{Error, Result, ensure, input};
 use crate::scenes::scene::Scene;
@@ -75,6 +75,9 @@ fn body(file: &BodyFile) -> Result<Body> {
     let load = |name, load| checked(name, load, "zero unless the body is dynamic", pushed);
     (body.force, body.torque) = (load("force", file.force)?.into(), load("torque", file.torque)?.into());
     [body.gravity_scale] = finite("gravity_scale", [file.gravity_scale])?;
+    [body.linear_damping] = finite("linear_damping", [file.linear_damping])?;
+    [body.angular_damping] = finite("angular_damping", [file.angular_damping])?;
+    (body.locked_rotations, body.can_sleep) = (file.locked_rotations, file.can_sleep);
     body.groups = file.groups;
     body.swept = file.swept;
     let [friction, restitution] =
@@ -131,6 +134,10 @@ fn with_mass(mut body: Body, file: &BodyFile) -> Result<Body> {
         }
         _ => return Err(Error::input("density, mass and mass_properties: give only one of them")),
     }
+    if let Some(additional) = &file.additional_mass {
+        ensure(file.mass_properties.is_none(), || "additional_mass: mass_properties give the whole mass".into())?;
+        body = body.additional_mass(additional_mass(additional).map_err(|e| e.within("additional_mass"))?);
+    }
     if dynamic && file.mass_properties.is_none() && file.shapes.is_empty() {
         return Err(Error::input("a dynamic body without shapes needs mass_properties"));
     }
@@ -143,6 +150,17 @@ fn mass_properties(file: &MassFile) -> Result<MassProperties> {
         mass,
         center: lengths("center", file.center)?.into(),
         principal_inertia: positive("principal_inertia", file.principal_inertia)?.into(),
+        principal_frame: rotation("principal_frame", file.principal_frame)?,
+    })
+}
+
+fn additional_mass(file: &AdditionalMassFile) -> Result<MassProperties> {
+    let [mass] = positive("mass", [file.mass])?;
+    let moments = checked("principal_inertia", file.principal_inertia, "0 or more", |x| x >= 0.0)?;
+    Ok(MassProperties {
+        mass,
+        center: lengths("center", file.center)?.into(),
+        principal_inertia: moments.into(),
         principal_frame: rotation("principal_frame", file.principal_frame)?,
     })
 }

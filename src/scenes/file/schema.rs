@@ -19,8 +19,8 @@ use crate::world::{BodyKind, Groups};
 ///
 /// ```
 /// use drystone::scenes::{
-///     AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,
-///     SpawnerFile, SpringFile,
+///     AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile,
+///     ShapeFile, SpawnerFile, SpringFile,
 /// };
 ///
 /// let text = r#"{"version": 1,
@@ -28,15 +28,16 @@ use crate::world::{BodyKind, Groups};
 ///         {"name": "door", "position": [0.5, 1, 0], "leaves": {"after": 9},
 ///          "mass_properties": {"mass": 20, "principal_inertia": [1, 1, 1]},
 ///          "shapes": [{"type": "cuboid", "half_extents": [0.5, 1, 0.02]}]},
-///         {"name": "lamp", "position": [3, 1, 0], "shapes": [{"type": "ball", "radius": 0.1}]}],
+///         {"name": "lamp", "position": [3, 1, 0], "additional_mass": {"mass": 2}, "shapes": [{"type": "ball", "radius": 0.1}]}],
 ///     "joints": [
 ///         {"type": "hinge", "bodies": ["door"], "anchor": [0, 1, 0], "axis": [0, 1, 0], "motor": {"speed": 1, "max_load": 9}},
 ///         {"type": "generic", "bodies": [1], "anchor": [3, 2, 0], "linear": [{}, {"spring": {"frequency": 2}}, {}], "angular": [{}, {}, {}]}],
 ///     "spawners": [{"every": 60, "body": {"shapes": [{"type": "ball", "radius": 0.3}]}}]}"#;
 /// let file = SceneFile::parse(text)?;
-/// let [BodyFile { leaves, mass_properties, shapes, .. }, _] = &file.bodies[..] else { panic!("two bodies") };
+/// let [BodyFile { leaves, mass_properties, shapes, .. }, BodyFile { additional_mass, .. }] = &file.bodies[..] else { panic!("two bodies") };
 /// assert!(matches!(leaves, Some(LeavesFile { after: Some(9.0), below: None })));
 /// assert!(matches!(mass_properties, Some(MassFile { mass: 20.0, .. })));
+/// assert!(matches!(additional_mass, Some(AdditionalMassFile { mass: 2.0, principal_inertia: [0.0, 0.0, 0.0], .. })));
 /// assert!(matches!(&shapes[..], [ShapeFile { geometry: Geometry::Cuboid { .. }, sensor: false, .. }]));
 /// let [door, lamp]: &[JointFile; 2] = file.joints[..].try_into().expect("two joints");
 /// assert!(matches!(&door.bodies[..], [BodyRef::Name(name)] if name == "door"));
@@ -132,6 +133,14 @@ pub struct BodyFile {
     pub torque: [f64; 3],
     /// Factor on the gravity of a dynamic body: 0 floats, -1 rises as fast as others fall.
     pub gravity_scale: f64,
+    /// The rate at which the linear velocity of a dynamic body decays (1/s), 0 to 1e9.
+    pub linear_damping: f64,
+    /// The rate at which the angular velocity of a dynamic body decays (1/s), 0 to 1e9.
+    pub angular_damping: f64,
+    /// Whether a dynamic body does not turn about the axes x, y and z of the world.
+    pub locked_rotations: [bool; 3],
+    /// Whether a dynamic body may fall asleep.
+    pub can_sleep: bool,
     /// Density of all shapes (kg/m³), more than 0. The default is 1000 for a dynamic body without a mass.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
@@ -141,6 +150,9 @@ pub struct BodyFile {
     /// Mass, center and inertia, instead of the values from the shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass_properties: Option<MassFile>,
+    /// Mass added to that of the shapes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub additional_mass: Option<AdditionalMassFile>,
     /// Coulomb coefficient, 0 or more. A contact has the geometric mean of both bodies.
     pub friction: f64,
     /// Ratio of separation to approach velocity, 0 to 1. A contact has the larger value of both bodies.
@@ -168,9 +180,14 @@ impl Default for BodyFile {
             force: [0.0; 3],
             torque: [0.0; 3],
             gravity_scale: 1.0,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+            locked_rotations: [false; 3],
+            can_sleep: true,
             density: None,
             mass: None,
             mass_properties: None,
+            additional_mass: None,
             friction: 0.5,
             restitution: 0.0,
             groups: Groups::ALL,
@@ -179,6 +196,24 @@ impl Default for BodyFile {
             shapes: Vec::new(),
         }
     }
+}
+
+/// Mass added to that of the shapes of a body, in the body's frame.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Additional mass")]
+pub struct AdditionalMassFile {
+    /// Mass (kg), more than 0.
+    pub mass: f64,
+    /// Its center (m).
+    #[serde(default)]
+    pub center: [f64; 3],
+    /// Moments of inertia about its principal axes through its center (kg m²), 0 or more: 0 of a point mass.
+    #[serde(default)]
+    pub principal_inertia: [f64; 3],
+    /// Rotation from its principal axes to the body's frame: a quaternion x, y, z, w.
+    #[serde(default = "defaults::rotation")]
+    pub principal_frame: [f64; 4],
 }
 
 /// Mass, center of mass and inertia of a body, in the body's frame.

@@ -109,7 +109,7 @@ fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
 #[test]
 fn a_number_out_of_range_is_refused_by_body_and_field_until_it_is_mended() {
     type Change = fn(&mut Body, f32);
-    let changes: [(&str, Change); 10] = [
+    let changes: [(&str, Change); 12] = [
         ("position", |b, x| b.position.y = x),
         ("rotation", |b, x| b.rotation.x = x),
         ("linear velocity", |b, x| b.linear_velocity.x = x),
@@ -120,6 +120,8 @@ fn a_number_out_of_range_is_refused_by_body_and_field_until_it_is_mended() {
         ("force", |b, x| b.apply_force(Vec3::splat(x) * b.mass.mass)),
         ("torque", |b, x| b.apply_torque(Vec3::splat(x) * b.mass.principal_inertia)),
         ("gravity_scale", |b, x| b.gravity_scale = x),
+        ("linear_damping", |b, x| b.linear_damping = x),
+        ("angular_damping", |b, x| b.angular_damping = x),
     ];
     for (field, change) in changes {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3e38, -1e25, 2e9] {

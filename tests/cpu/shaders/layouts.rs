@@ -7,8 +7,8 @@ use super::parsed;
 use drystone::stages::backend::shader::{JOINT_BLOCK, JOINT_NODE, ResidentParams, SCRATCH_ROW, WrittenContact};
 use drystone::stages::problem::carry::{Preload, Written};
 use drystone::stages::problem::{
-    AxisRow, BodyRow, ContactRow, ConvergenceRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow, MassRow,
-    MomentumRow, Params, PassRow, PointRow, Softness, TorqueRow, TurningRow,
+    AxisRow, BodyRow, ContactRow, ConvergenceRow, DampingRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow,
+    JointRow, MassRow, MomentumRow, Params, PassRow, PointRow, Softness, TorqueRow, TurningRow,
 };
 
 const TYPES: &str = include_str!("../../../shaders/lib/types.wgsl");
@@ -69,6 +69,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Free = FreeRow { v w }
         Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz heap acceleration }
         Torque = TorqueRow { angular_acceleration }
+        Damping = DampingRow { linear_gain linear_loss angular_gain angular_loss }
         Inertia = InertiaRow { principal body inv_principal frame }
         Contact = ContactRow {
             normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b

@@ -1,0 +1,212 @@
+//! Bodies that turn about some axes of the world only.
+
+use crate::common::{Open, gpu};
+use drystone::glam::{DVec3, Mat3, Quat, Vec3};
+use drystone::{Body, Cpu, Joint, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
+
+tests! {
+    every_backend {
+        a_body_with_locked_rotations_never_turns,
+        bodies_of_a_plane_turn_about_its_normal_only,
+        a_board_turns_about_the_free_axis_as_on_bearings,
+        a_hit_beside_the_center_of_a_locked_body_is_a_central_one,
+    }
+    exact_gpu {
+        a_gpu_has_the_bits_of_the_reference_with_locked_axes,
+    }
+    no_gpu {
+        lanes_have_the_bits_of_the_reference_with_locked_axes,
+        free_axes_keep_their_momentum,
+        axes_that_a_caller_locks_stop_in_the_next_step,
+        a_contact_problem_of_locked_bodies_is_refused_by_name,
+    }
+}
+
+const DT: f32 = 1.0 / 60.0;
+
+fn reference() -> Box<dyn drystone::Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+/// A cube of 6 kg with sides of 1 m: 1 kg m² about every axis.
+fn cube() -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(6.0)
+}
+
+fn weightless() -> World {
+    World { gravity: Vec3::ZERO, ..World::new() }
+}
+
+fn simulation(world: World, substeps: u32, open: Open) -> Simulation {
+    let config = SolverConfig::default().with(|c| c.substeps = substeps);
+    Simulation::new(world, config, open()).expect("a simulation")
+}
+
+fn after(world: World, substeps: u32, steps: u32, open: Open) -> World {
+    let mut simulation = simulation(world, substeps, open);
+    (0..steps).for_each(|_| drop(simulation.step(DT).expect("a step")));
+    simulation.world
+}
+
+/// Every bit of every pose and velocity.
+fn bits(world: &World) -> Vec<[u32; 13]> {
+    let of = |b: &Body| {
+        let ([px, py, pz], [vx, vy, vz]) = (b.position.to_array(), b.linear_velocity.to_array());
+        let ([wx, wy, wz], [qx, qy, qz, qw]) = (b.angular_velocity.to_array(), b.rotation.to_array());
+        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
+    };
+    world.bodies.iter().map(of).collect()
+}
+
+/// Boards that fall on an edge, balls that hit them beside their middle, and a pendulum, with the axes of each locked that `axes` gives.
+fn mixture(axes: impl Fn(usize) -> [bool; 3]) -> World {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let turn = Quat::from_scaled_axis(Vec3::new(0.4, -0.9, 0.3));
+    for k in 0..4 {
+        let board = Body::dynamic().shape(Shape::cuboid(0.6, 0.1, 0.3)).rotation(turn);
+        world.add(board.position(3.0 * k as f32, 1.2, 0.0).velocity(Vec3::X, Vec3::new(1.0, 2.0, -3.0)));
+        let ball = Body::dynamic().shape(Shape::ball(0.2)).position(3.0 * k as f32 + 0.4, 2.5, 0.1);
+        world.add(ball.velocity(Vec3::Y * -3.0, Vec3::ZERO));
+    }
+    let bob = Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)).position(-3.0, 3.0, 0.0).rotation(turn);
+    let bob = world.add(bob.velocity(Vec3::Z * 2.0, Vec3::Y));
+    world.join(Joint::to_world(bob, Vec3::Y, Vec3::new(-3.0, 4.0, 0.0)));
+    (0..world.bodies.len()).for_each(|k| world.bodies[k].locked_rotations = axes(k));
+    world
+}
+
+fn a_body_with_locked_rotations_never_turns(open: Open) {
+    for substeps in [8, 64] {
+        let before = mixture(|_| [true; 3]);
+        let world = after(before.clone(), substeps, 60, open);
+        for (body, before) in world.bodies.iter().zip(&before.bodies) {
+            assert_eq!(body.rotation.to_array().map(f32::to_bits), before.rotation.to_array().map(f32::to_bits));
+            assert_eq!(body.angular_velocity, Vec3::ZERO);
+        }
+        // They still move, and the floor holds them.
+        assert!(world.bodies.iter().skip(1).all(|body| body.position.y > 0.1));
+        assert!(world.bodies[1].position.y < 0.7, "{}", world.bodies[1].position);
+    }
+}
+
+fn bodies_of_a_plane_turn_about_its_normal_only(open: Open) {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    for k in 0..8 {
+        // Hits out of the plane, and edges that tip.
+        let body = cube().position(0.4 * (k % 3) as f32, 0.9 + 1.3 * k as f32, 0.05 * k as f32);
+        world.add(body.rotation(Quat::from_rotation_z(0.3 * k as f32)).locked_rotations([true, true, false]));
+    }
+    let world = after(world, 8, 120, open);
+    let mut turned = 0.0_f32;
+    for body in world.bodies.iter().skip(1) {
+        assert_eq!((body.rotation.x, body.rotation.y), (0.0, 0.0));
+        assert_eq!((body.angular_velocity.x, body.angular_velocity.y), (0.0, 0.0));
+        turned = turned.max(body.rotation.z.abs());
+    }
+    assert!(turned > 0.1);
+}
+
+/// A board whose principal axes are none of the world turns about a fixed axis n by the moment n I n, whatever its other moments are.
+fn a_board_turns_about_the_free_axis_as_on_bearings(open: Open) {
+    let inertia = Vec3::new(1.0, 2.0, 2.5);
+    let mass =
+        MassProperties { mass: 3.0, principal_inertia: inertia, principal_frame: Quat::IDENTITY, center: Vec3::ZERO };
+    let rotation = Quat::from_scaled_axis(Vec3::new(0.7, -0.5, 0.9));
+    for (k, free) in Vec3::AXES.into_iter().enumerate() {
+        let mut world = weightless();
+        let axes = [0, 1, 2].map(|axis| axis != k);
+        world.add(Body::dynamic().mass_properties(mass).rotation(rotation).locked_rotations(axes));
+        world.bodies[0].torque = Vec3::new(2.0, -3.0, 1.5);
+        let moment = free.dot(Mat3::from_quat(rotation) * (inertia * (rotation.inverse() * free)));
+        let wanted = free * (0.5 * world.bodies[0].torque.dot(free) / moment);
+        for substeps in [8, 64] {
+            let spin = after(world.clone(), substeps, 30, open).bodies[0].angular_velocity;
+            assert!((spin - wanted).length() < 2e-5 * wanted.length(), "{spin}, not {wanted}");
+            assert!((0..3).all(|axis| axis == k || spin[axis] == 0.0), "{spin}");
+        }
+    }
+}
+
+/// A ball without friction that hits a locked cube beside its center, without restitution: both go on with m v/(m + M).
+fn a_hit_beside_the_center_of_a_locked_body_is_a_central_one(open: Open) {
+    let mut world = weightless();
+    world.add(cube().locked_rotations([true; 3]).friction(0.0));
+    let ball = Body::dynamic().shape(Shape::ball(0.2)).total_mass(2.0).friction(0.0).position(-1.0, 0.4, 0.3);
+    world.add(ball.velocity(Vec3::X * 4.0, Vec3::ZERO));
+    let world = after(world, 8, 60, open);
+    for body in &world.bodies {
+        let v = body.linear_velocity;
+        assert!((v - Vec3::X).length() < 1e-5, "{v}");
+    }
+}
+
+fn alternating(k: usize) -> [bool; 3] {
+    [k & 1 > 0, k & 2 > 0, k & 4 > 0]
+}
+
+fn same_as_the_reference(open: Open) {
+    for substeps in [8, 32] {
+        let [ours, theirs] = [reference, open].map(|open| after(mixture(alternating), substeps, 40, open));
+        assert_eq!(bits(&ours), bits(&theirs), "{substeps} substeps");
+        for body in &ours.bodies {
+            assert!((0..3).all(|axis| !body.locked_rotations[axis] || body.angular_velocity[axis] == 0.0));
+        }
+    }
+}
+
+fn a_gpu_has_the_bits_of_the_reference_with_locked_axes() {
+    same_as_the_reference(|| Box::new(gpu::exact()));
+}
+
+fn lanes_have_the_bits_of_the_reference_with_locked_axes() {
+    same_as_the_reference(|| Box::new(Cpu::new()));
+}
+
+/// Locks take momentum about their own axes only: what meets in a plane moves as without locks, and keeps its linear momentum.
+fn free_axes_keep_their_momentum() {
+    let meet = |axes: [bool; 3]| {
+        let mut world = weightless();
+        // A cube and a ball that meet beside their centers, in a plane across z; friction takes steps by the inertia about all axes.
+        world.add(cube().locked_rotations(axes).restitution(0.5).friction(0.0));
+        let ball = Body::dynamic().shape(Shape::ball(0.3)).total_mass(2.0).position(-1.5, 0.4, 0.0).restitution(0.5);
+        world.add(ball.friction(0.0).velocity(Vec3::X * 3.0, Vec3::Z).locked_rotations(axes));
+        after(world, 8, 60, reference)
+    };
+    let [free, locked] = [[false; 3], [true, true, false]].map(meet);
+    for world in [&free, &locked] {
+        assert!((world.linear_momentum() - DVec3::X * 6.0).length() < 1e-5, "{}", world.linear_momentum());
+    }
+    let [free_momentum, momentum] = [&free, &locked].map(|world| world.angular_momentum().z);
+    assert!((momentum - free_momentum).abs() < 1e-5, "{momentum}, not {free_momentum}");
+    for (body, free) in locked.bodies.iter().zip(&free.bodies) {
+        assert!((body.angular_velocity - free.angular_velocity).length() < 1e-5, "{}", body.angular_velocity);
+        assert_eq!(body.position.z, 0.0);
+    }
+    assert!(locked.bodies[0].angular_velocity.z.abs() > 0.1);
+}
+
+fn axes_that_a_caller_locks_stop_in_the_next_step() {
+    let mut world = weightless();
+    world.add(cube().velocity(Vec3::X, Vec3::new(1.0, 2.0, 3.0)));
+    let mut simulation = simulation(world, 8, reference);
+    simulation.step(DT).expect("a step");
+    simulation.world.bodies[0].locked_rotations = [true, false, true];
+    simulation.step(DT).expect("a step");
+    let body = &simulation.world.bodies[0];
+    assert_eq!((body.angular_velocity, body.linear_velocity), (Vec3::Y * body.angular_velocity.y, Vec3::X));
+    assert!((body.angular_velocity.y - 2.0).abs() < 1e-5);
+    simulation.world.bodies[0].locked_rotations = [false; 3];
+    simulation.world.bodies[0].apply_angular_impulse(Vec3::X);
+    simulation.step(DT).expect("a step");
+    assert!((simulation.world.bodies[0].angular_velocity.x - 1.0).abs() < 1e-5);
+}
+
+fn a_contact_problem_of_locked_bodies_is_refused_by_name() {
+    let mut world = World::new();
+    world.add(cube().named("crate").locked_rotations([false, true, false]));
+    let error =
+        simulation(world, 8, reference).step_with_contacts("one", DT).map(|_| ()).expect_err("a lock").to_string();
+    assert_eq!(error, "body 0 \"crate\" has locked rotations: a body of a contact problem turns freely");
+}
