@@ -12,8 +12,10 @@ True
 from ._batch import Batch, Contacts, Hits, Snapshots, WorldError, wxyz
 from ._build import Body, Joint, World
 from ._drystone import InternalError
+from ._families import Stability
+from ._families import survey_with_families as survey
 from ._scene import Config, Parameter, Scene, SceneInfo, scenes
-from ._survey import NotTheSame, Rows, survey
+from ._survey import NotTheSame, Rows
 
 __all__ = [
     "Batch",
@@ -29,6 +31,7 @@ __all__ = [
     "Scene",
     "SceneInfo",
     "Snapshots",
+    "Stability",
     "World",
     "WorldError",
     "scenes",

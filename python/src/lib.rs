@@ -5,6 +5,7 @@
 
 mod batch;
 mod columns;
+mod families;
 mod scene;
 
 use std::ffi::OsString;
@@ -43,6 +44,8 @@ mod _drystone {
     use super::batch::{Batch, State};
     #[pymodule_export]
     use super::command;
+    #[pymodule_export]
+    use super::families::{family_names, judge, wilson};
     #[pymodule_export]
     use super::scene::{Config, Scene, catalogue, schema};
 }
