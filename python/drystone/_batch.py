@@ -25,6 +25,7 @@ INPUTS = {"force": 3, "torque": 3, "gravity": 3, "ctrl": 1}
 ON_REQUEST = {
     "friction": 1,
     "restitution": 1,
+    "mass_scale": 1,
     "joint_position": 6,
     "joint_speed": 6,
     "joint_impulse": 3,
@@ -50,6 +51,10 @@ MEASURES = (
     "contacts",
     "asleep",
     "finite",
+    "residual_velocity",
+    "residual_cone",
+    "residual_complementarity",
+    "residual_dissipation",
 )
 LISTEN = ("contacts", "impulses", "hits")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
@@ -441,6 +446,11 @@ class Batch:
         return self._column("restitution")
 
     @property
+    def mass_scale(self) -> Floats:
+        """[W, B] mass and moments of inertia over those at the start; a new array. `set_material` changes them."""
+        return self._column("mass_scale")
+
+    @property
     def joint_position(self) -> Floats:
         """[W, J, 6] three lengths (m) and three angles (rad) of each joint; a new array."""
         return self._column("joint_position")
@@ -625,16 +635,23 @@ class Batch:
         bodies: ArrayLike | None = None,
         friction: ArrayLike | None = None,
         restitution: ArrayLike | None = None,
+        mass_scale: ArrayLike | None = None,
     ) -> None:
-        """Set coefficients [w, b] of some bodies of some worlds. A reset sets them as the scene has them.
+        """Set coefficients [w, b] of some bodies of some worlds, and the mass with the moments of inertia over those at the start. A reset sets them
+        as the scene has them. What has no mass keeps none.
+
+        ValueError: wrong shapes, or a mass that is not 1e-15 to 1e15 kg.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
         >>> batch.set_material(friction=[[0.9] * 3, [0.1] * 3])
         >>> batch.friction[:, 1].round(2).tolist()
         [0.8999999761581421, 0.10000000149011612]
+        >>> batch.set_material(worlds=[1], bodies=[2], mass_scale=[[4]])
+        >>> batch.mass_scale[:, 2].tolist()
+        [1.0, 4.0]
         """
-        self._write({"friction": friction, "restitution": restitution}, worlds, bodies)
+        self._write({"friction": friction, "restitution": restitution, "mass_scale": mass_scale}, worlds, bodies)
 
     def _write(self, values: dict[str, ArrayLike | None], worlds: ArrayLike | None, bodies: ArrayLike | None) -> None:
         chosen = _check.worlds(worlds, self._worlds)
@@ -746,7 +763,9 @@ class Batch:
 
         overlap_max, overlap_mean and overlap_95 (m, of contacts computed anew), joint_gap (m), kinetic_energy and potential_energy (J), momentum_x,
         y, z (N s), angular_momentum_x, y, z about the origin (N m s), fastest (m/s), need (of the hardest contact), energy_taken in the last step
-        (J), contacts, asleep, finite.
+        (J), contacts, asleep, finite. residual_velocity (without unit), residual_cone (N s), residual_complementarity and residual_dissipation (J):
+        how far the first substep of the next step leaves impulses from solving its contacts. That step is made on a copy of the world, and costs
+        as much as one. They are NaN of a world with joints.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
