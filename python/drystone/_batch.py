@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+import tempfile
 import threading
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -56,6 +58,8 @@ MEASURES = (
     "residual_complementarity",
     "residual_dissipation",
 )
+# Side of a picture.
+MOST_PIXELS = 8192
 LISTEN = ("contacts", "impulses", "hits")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
 
@@ -824,6 +828,30 @@ class Batch:
         self._alone(lambda: self._batch.ray(chosen, rays[0], rays[1], most, body, distance, normal))
         return Hits(body, distance, normal)
 
+    def picture(
+        self, world: int = 0, width: int = 640, height: int = 480, *, yaw: float = 30, pitch: float = 25
+    ) -> NDArray[np.uint8]:
+        """A picture of a world as it is: [height, width, 3], red, green and blue, rows from the top. `yaw` is the angle of the camera around the
+        world, `pitch` its elevation above the horizon (degrees, below 89 either way). All that moves is in view. Colors are those of materials.
+
+        A GPU draws it, or a software driver (Mesa's lavapipe: package mesa-vulkan-drivers). AdapterError: there is neither, or a side is too long
+        for it.
+
+        >>> import drystone as ds
+        >>> try:
+        ...     print(ds.Batch(ds.Scene.find("tower", n=3)).picture(width=64, height=48).shape)
+        ... except ds.AdapterError:
+        ...     print((48, 64, 3))
+        (48, 64, 3)
+        """
+        [chosen] = _check.worlds(_check.whole("world", world), self._worlds, "world")
+        size = (_side("width", width), _side("height", height))
+        if sys.platform == "linux":
+            # Without a desktop, Mesa prints a line where there is no such folder.
+            os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
+        angles = np.radians([_check.number("yaw", yaw), min(89.0, max(-89.0, _check.number("pitch", pitch)))])
+        return self._alone(lambda: self._batch.picture(int(chosen), size, *(float(angle) for angle in angles)))
+
     @staticmethod
     def _rays(name: str, value: ArrayLike, worlds: int) -> Floats:
         if np.ndim(value) == 2:
@@ -852,6 +880,13 @@ def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:
     if not values:
         raise ValueError(f"{name} is empty: must have at least one {kind.__name__}")
     return list(values)
+
+
+def _side(name: str, pixels: Any) -> int:
+    side = _check.whole(name, pixels, 1)
+    if side > MOST_PIXELS:
+        raise ValueError(f"{name} = {side}: must be at most {MOST_PIXELS}")
+    return side
 
 
 def _step_length(dt: Any) -> float:

@@ -365,3 +365,32 @@ def test_masses_are_scaled_from_those_of_the_start() -> None:
 def test_a_scene_whose_bodies_come_and_go_is_refused_by_name() -> None:
     with pytest.raises(ValueError, match="^conveyor: bodies come or leave by themselves, and a batch has worlds of constant bodies$"):
         ds.Batch(ds.Scene.find("conveyor"))
+
+
+def test_a_picture_shows_the_world_as_it_is() -> None:
+    batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+    try:
+        first = batch.picture(0, 160, 120)
+    except ds.AdapterError as error:
+        pytest.skip(str(error))
+    assert first.shape == (120, 160, 3) and first.dtype == np.uint8 and len(np.unique(first.reshape(-1, 3), axis=0)) > 20
+    before = batch.hash()
+    assert np.array_equal(first, batch.picture(1, 160, 120)) and (before == batch.hash()).all()
+    batch.set_state(worlds=[1], bodies=[3], position=[[[2, 0.5, 0]]])
+    assert not np.array_equal(first, batch.picture(1, 160, 120))
+    assert not np.array_equal(first, batch.picture(0, 160, 120, yaw=80))
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({"world": 2}, "world has 2: must be 0 to 1"),
+        ({"width": 0}, "width = 0: must be 1 or more"),
+        ({"height": 10**6}, "height = 1000000: must be at most 8192"),
+        ({"yaw": float("nan")}, "yaw = nan: must be finite"),
+    ],
+)
+def test_a_picture_names_wrong_arguments(options: dict, line: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        ds.Batch(ds.Scene.find("tower", n=1), 2).picture(**options)
+    assert str(caught.value) == line

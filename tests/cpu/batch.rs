@@ -312,7 +312,7 @@ fn residuals_are_those_of_the_next_step_and_the_world_stays_as_it_is() {
     let measures = [Measure::ResidualVelocity, Measure::ResidualCone, Measure::ResidualDissipation];
     let scene = scene("pile", &["n=27"]);
     let of = |substeps: u32| {
-        let config = SolverConfig { substeps, max_substeps: substeps, ..SolverConfig::default() };
+        let config = SolverConfig::default().with(|c| (c.substeps, c.max_substeps) = (substeps, substeps));
         let mut batch = Batch::of(&scene, &config, 2).expect("worlds");
         assert!(batch.step(40, &[0, 1]).expect("worlds").is_empty());
         let before = batch.world(0).hash();
