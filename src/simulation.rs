@@ -21,9 +21,10 @@ use crate::error::{Error, Result};
 use crate::metrics::Penetration;
 use crate::panics::{self, Panic};
 use crate::plan::{Kernel, Pass, StepPlan};
-use crate::problem::StepProblem;
 use crate::problem::carry::Carry;
+use crate::problem::{ContactRow, StepProblem};
 use crate::queries::Queries;
+use crate::residuals::Residuals;
 use crate::stats::{StepStats, Stopwatch, timed};
 #[cfg(doc)]
 use crate::world::Body;
@@ -312,6 +313,37 @@ impl Simulation {
         let contacts = ContactProblem::of_step(name.into(), &problem);
         self.end_step(dt, &mut stats)?;
         Ok((contacts, stats))
+    }
+
+    /// Moves the world by `dt` seconds and returns the residuals of the impulses after the first substep, which
+    /// [`Reference`] computes a second time. They are zero if no awake bodies touch.
+    ///
+    /// ```
+    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// # let mut world = World::new();
+    /// # world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// assert!(simulation.step_with_residuals(1.0 / 60.0)?.e_vel < 1e-3);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Simulation::step_with_contacts`].
+    pub fn step_with_residuals(&mut self, dt: f32) -> Result<Residuals> {
+        let (mut problem, plan) = self.next_problem(dt)?;
+        let begins = |p: &Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. });
+        let end = plan.passes.iter().skip(1).position(begins).map_or(plan.passes.len(), |i| i + 1);
+        Reference::<f32>::new().run(&mut problem, &plan.passes[..end])?;
+        let of_contact = |row: &ContactRow| {
+            let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
+            problem.impulses[own].iter().map(|i| glam::Vec3::new(i.normal, i.tangent_1, i.tangent_2).as_dvec3())
+        };
+        let mut impulses: Vec<_> = problem.swept_contacts().flat_map(of_contact).collect();
+        let (contacts, _) = self.step_with_contacts("the world", dt)?;
+        // A step in which all bodies sleep has no impulses.
+        impulses.truncate(contacts.contacts.len());
+        Ok(Residuals::of(&contacts, &impulses))
     }
 
     /// The caller's changes since the last step.

@@ -11,11 +11,14 @@ True
 
 from ._batch import Batch, Contacts, Hits, Snapshots, WorldError, wxyz
 from ._build import Body, Joint, World
-from ._drystone import InternalError
+from ._drystone import AdapterError, InternalError
+from ._families import Stability
+from ._families import survey_with_families as survey
 from ._scene import Config, Parameter, Scene, SceneInfo, scenes
-from ._survey import NotTheSame, Rows, survey
+from ._survey import NotTheSame, Rows
 
 __all__ = [
+    "AdapterError",
     "Batch",
     "Body",
     "Config",
@@ -29,6 +32,7 @@ __all__ = [
     "Scene",
     "SceneInfo",
     "Snapshots",
+    "Stability",
     "World",
     "WorldError",
     "scenes",

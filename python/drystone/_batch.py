@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+import tempfile
 import threading
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,6 +27,7 @@ INPUTS = {"force": 3, "torque": 3, "gravity": 3, "ctrl": 1}
 ON_REQUEST = {
     "friction": 1,
     "restitution": 1,
+    "mass_scale": 1,
     "joint_position": 6,
     "joint_speed": 6,
     "joint_impulse": 3,
@@ -50,7 +53,13 @@ MEASURES = (
     "contacts",
     "asleep",
     "finite",
+    "residual_velocity",
+    "residual_cone",
+    "residual_complementarity",
+    "residual_dissipation",
 )
+# Side of a picture.
+MOST_PIXELS = 8192
 LISTEN = ("contacts", "impulses", "hits")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
 
@@ -441,6 +450,11 @@ class Batch:
         return self._column("restitution")
 
     @property
+    def mass_scale(self) -> Floats:
+        """[W, B] mass and moments of inertia over those at the start; a new array. `set_material` changes them."""
+        return self._column("mass_scale")
+
+    @property
     def joint_position(self) -> Floats:
         """[W, J, 6] three lengths (m) and three angles (rad) of each joint; a new array."""
         return self._column("joint_position")
@@ -625,16 +639,23 @@ class Batch:
         bodies: ArrayLike | None = None,
         friction: ArrayLike | None = None,
         restitution: ArrayLike | None = None,
+        mass_scale: ArrayLike | None = None,
     ) -> None:
-        """Set coefficients [w, b] of some bodies of some worlds. A reset sets them as the scene has them.
+        """Set coefficients [w, b] of some bodies of some worlds, and the mass with the moments of inertia over those at the start. A reset sets them
+        as the scene has them. What has no mass keeps none.
+
+        ValueError: wrong shapes, or a mass that is not 1e-15 to 1e15 kg.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
         >>> batch.set_material(friction=[[0.9] * 3, [0.1] * 3])
         >>> batch.friction[:, 1].round(2).tolist()
         [0.8999999761581421, 0.10000000149011612]
+        >>> batch.set_material(worlds=[1], bodies=[2], mass_scale=[[4]])
+        >>> batch.mass_scale[:, 2].tolist()
+        [1.0, 4.0]
         """
-        self._write({"friction": friction, "restitution": restitution}, worlds, bodies)
+        self._write({"friction": friction, "restitution": restitution, "mass_scale": mass_scale}, worlds, bodies)
 
     def _write(self, values: dict[str, ArrayLike | None], worlds: ArrayLike | None, bodies: ArrayLike | None) -> None:
         chosen = _check.worlds(worlds, self._worlds)
@@ -746,7 +767,9 @@ class Batch:
 
         overlap_max, overlap_mean and overlap_95 (m, of contacts computed anew), joint_gap (m), kinetic_energy and potential_energy (J), momentum_x,
         y, z (N s), angular_momentum_x, y, z about the origin (N m s), fastest (m/s), need (of the hardest contact), energy_taken in the last step
-        (J), contacts, asleep, finite.
+        (J), contacts, asleep, finite. residual_velocity (without unit), residual_cone (N s), residual_complementarity and residual_dissipation (J):
+        how far the first substep of the next step leaves impulses from solving its contacts. That step is made on a copy of the world, and costs
+        as much as one. They are NaN of a world with joints.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
@@ -805,6 +828,30 @@ class Batch:
         self._alone(lambda: self._batch.ray(chosen, rays[0], rays[1], most, body, distance, normal))
         return Hits(body, distance, normal)
 
+    def picture(
+        self, world: int = 0, width: int = 640, height: int = 480, *, yaw: float = 30, pitch: float = 25
+    ) -> NDArray[np.uint8]:
+        """A picture of a world as it is: [height, width, 3], red, green and blue, rows from the top. `yaw` is the angle of the camera around the
+        world, `pitch` its elevation above the horizon (degrees, below 89 either way). All that moves is in view. Colors are those of materials.
+
+        A GPU draws it, or a software driver (Mesa's lavapipe: package mesa-vulkan-drivers). AdapterError: there is neither, or a side is too long
+        for it.
+
+        >>> import drystone as ds
+        >>> try:
+        ...     print(ds.Batch(ds.Scene.find("tower", n=3)).picture(width=64, height=48).shape)
+        ... except ds.AdapterError:
+        ...     print((48, 64, 3))
+        (48, 64, 3)
+        """
+        [chosen] = _check.worlds(_check.whole("world", world), self._worlds, "world")
+        size = (_side("width", width), _side("height", height))
+        if sys.platform == "linux":
+            # Without a desktop, Mesa prints a line where there is no such folder.
+            os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
+        angles = np.radians([_check.number("yaw", yaw), min(89.0, max(-89.0, _check.number("pitch", pitch)))])
+        return self._alone(lambda: self._batch.picture(int(chosen), size, *(float(angle) for angle in angles)))
+
     @staticmethod
     def _rays(name: str, value: ArrayLike, worlds: int) -> Floats:
         if np.ndim(value) == 2:
@@ -833,6 +880,13 @@ def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:
     if not values:
         raise ValueError(f"{name} is empty: must have at least one {kind.__name__}")
     return list(values)
+
+
+def _side(name: str, pixels: Any) -> int:
+    side = _check.whole(name, pixels, 1)
+    if side > MOST_PIXELS:
+        raise ValueError(f"{name} = {side}: must be at most {MOST_PIXELS}")
+    return side
 
 
 def _step_length(dt: Any) -> float:

@@ -12,7 +12,7 @@ import signal
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent import futures
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
@@ -90,6 +90,7 @@ def survey(
     workers: int | None = None,
     chunk: int | None = None,
     twice: float = 0.01,
+    timed: Collection[str] = (),
     on_error: str = "row",
     progress: bool | None = None,
 ) -> Rows:
@@ -99,7 +100,8 @@ def survey(
     `out` is a file of JSON lines, one when a row is there, put in order at the end; the same call again takes its rows over,
     and drops a line that was cut off. `engine`: "here" is this process, "processes" a pool, "ray" a cluster (drystone[ray]); "auto" is "ray"
     where Ray is initialized, and else "processes". `chunk`: runs a task; None aims at a second a task. `twice`: the share of runs that is
-    computed again by another worker; where results differ, NotTheSame names the run and both machines. `on_error`: "row" makes a row
+    computed again by another worker; where results differ, NotTheSame names the run and both machines. `timed` names results that a clock
+    gives, which may differ. `on_error`: "row" makes a row
     with `error` of an exception, "raise" raises it. Ctrl-C keeps the rows that are there.
 
     ValueError: an argument that cannot be used. RuntimeError: a run ended its worker three times.
@@ -121,7 +123,7 @@ def survey(
     asked = [_plain_run(k, one) for k, one in enumerate(runs)]
     keys = _keys(run, asked)
     with _Store(None if out is None else Path(out), keys) as store:
-        state = _Survey(run, asked, keys, store, share, on_error, size, _Progress(len(keys), progress))
+        state = _Survey(run, asked, keys, store, share, set(timed), on_error, size, _Progress(len(keys), progress))
         state.go_through(_engine(engine, workers))
     return store.rows(keys)
 
@@ -162,7 +164,7 @@ def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | Non
     for key, one in part:
         begin = time.perf_counter()
         try:
-            result = _plain(dict(run(dict(one))))
+            result = plain(dict(run(dict(one))))
         except Exception as error:
             if on_error == "raise":
                 raise
@@ -171,16 +173,16 @@ def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | Non
     return rows
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """A result as JSON has it, every number to the last bit."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
+        return [plain(one) for one in value]
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     raise TypeError(f"a result has {type(value).__name__}: must have numbers, strings and small arrays")
@@ -276,6 +278,7 @@ class _Survey:
     keys: list[str]
     store: _Store
     twice: float
+    timed: set[str]
     on_error: str
     chunk: int | None
     progress: _Progress
@@ -323,8 +326,10 @@ class _Survey:
     def _compare(self, numbers: list[int], rows: list[Row]) -> None:
         for k, row in zip(numbers, rows, strict=True):
             kept = json.loads(self.store.have[self.keys[k]])
-            first = {name: kept[name] for name in kept if name != "key" and name not in self.asked[k]}
-            again = {name: value for name, value in row["result"].items() if name not in self.asked[k]}
+            left_out = {"key", *self.asked[k], *self.timed}
+            first, again = (
+                {name: value for name, value in of.items() if name not in left_out} for of in (kept, row["result"])
+            )
             if not _same(first, again):
                 machines = (str(self.store.who[self.keys[k]]["machine"]), str(row["machine"]))
                 raise NotTheSame(self.asked[k], (first, again), machines)

@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from . import _check, _drystone
 from ._batch import Batch, Snapshots, WorldError
 from ._build import Body, Joint, World
 from ._scene import Config, Scene
@@ -323,5 +324,227 @@ def drawbridge(
         memory={"wanted": wanted},
         start=start,
         max_steps=max_steps,
+        autoreset_mode=autoreset_mode,
+    )
+
+
+# The board turns by so much in a second at most (degrees), and a ball is at the goal within so many cells of its middle.
+TILT_RATE, ARRIVED = 60.0, 0.4
+# Board, goal and lids of the walls turn together; the ball is the body after them.
+BOARD, BALL = (0, 1, 2), 3
+MAZE_SKIP = 6
+
+
+class _Board:
+    """A board of the maze game: its cells, and how far each is from the goal."""
+
+    def __init__(self, name: str) -> None:
+        scene, rows, self.cell, self.radius, self.steepest = _drystone.maze(name)
+        self.scene = Scene(scene, ())
+        self.cells = np.array([list(row) for row in rows])
+        self.size = np.array(self.cells.shape)
+        self.start, self.goal = (self.middle(np.argwhere(self.cells == symbol)[0]) for symbol in "SG")
+        self.left = self._left()
+
+    def middle(self, place: NDArray[Any]) -> NDArray[Any]:
+        """Middle of a cell, x and z (m)."""
+        middle: NDArray[Any] = (self.cell * (place + 0.5 - 0.5 * self.size))[::-1]
+        return middle
+
+    def left_at(self, ball: NDArray[Any]) -> NDArray[Any]:
+        """Cells from balls [W, 2] (x and z) to the goal, on a way around walls and holes."""
+        places = np.floor(ball[:, ::-1] / self.cell + 0.5 * self.size).astype(int)
+        row, column = np.clip(places, 0, self.size - 1).T
+        left: NDArray[Any] = self.left[row, column]
+        return left
+
+    def _left(self) -> NDArray[Any]:
+        left = np.full(self.cells.shape, float(self.cells.size))
+        wave = [tuple(int(i) for i in np.argwhere(self.cells == "G")[0])]
+        left[wave[0]] = 0
+        for row, column in wave:
+            for place in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
+                inside = 0 <= place[0] < self.size[0] and 0 <= place[1] < self.size[1]
+                if inside and self.cells[place] not in "#O" and left[place] == self.cells.size:
+                    left[place] = left[row, column] + 1
+                    wave.append(place)
+        return left
+
+
+def _turn_back(rotation: NDArray[Any], vector: NDArray[Any]) -> NDArray[Any]:
+    """Vectors [W, 3] in the frames of rotations [W, 4]."""
+    axis, w = -rotation[:, :3], rotation[:, 3:]
+    across = np.cross(axis, vector)
+    turned: NDArray[Any] = vector + 2 * (w * across + np.cross(axis, across))
+    return turned
+
+
+def _tilts(rotation: NDArray[Any]) -> NDArray[Any]:
+    """Tilts of boards [W, 2] to the right and to the front (rad)."""
+    x, _, z, w = rotation.T
+    return np.stack([2 * np.arctan2(-z, w), 2 * np.arctan2(x, w)], axis=1)
+
+
+def maze(
+    num_envs: int,
+    *,
+    board: str = "easy",
+    max_steps: int = 1200,
+    num_threads: int = 0,
+    autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+) -> VectorEnv:
+    """Roll a ball to the goal of a board and into no hole, by tilting the board: `board` is easy, medium, hard or a file (docs/maze.md).
+
+    Actions: the wanted tilts to the right and to the front, 1 for the steepest; the board turns by 60 degrees a second at most. An action lasts 1/20 s.
+    Observations: place of the ball on the board and its velocity (m, m/s), both tilts (rad), the way to the goal as the crow flies (m). Each
+    episode begins within a centimeter of the middle of the start. An episode ends at the goal (reward 1) or in a hole (-1); an action costs a
+    thousandth of the cells that are left on the way around walls and holes.
+
+    ValueError: no board of that name.
+
+    >>> from drystone.gym import maze
+    >>> envs = maze(2, board="easy")
+    >>> observations, _ = envs.reset(seed=1)
+    >>> observations, rewards, terminated, truncated, _ = envs.step(envs.action_space.sample())
+    >>> observations.shape, rewards.round(3).tolist()
+    ((2, 8), [-0.016, -0.016])
+    """
+    own = _Board(board)
+    batch = Batch(own.scene, num_envs, config=Config(sleep=False), num_threads=num_threads)
+    time = MAZE_SKIP * own.scene.dt
+    reach, steepest = np.radians(TILT_RATE) * time, np.radians(own.steepest)
+
+    def ball(batch: Batch) -> NDArray[Any]:
+        return _turn_back(batch.rotation[:, 0], batch.position[:, BALL])
+
+    def observe(batch: Batch) -> NDArray[Any]:
+        at, speed = ball(batch)[:, ::2], _turn_back(batch.rotation[:, 0], batch.linear_velocity[:, BALL])[:, ::2]
+        return np.concatenate([at, speed, _tilts(batch.rotation[:, 0]), own.goal - at], axis=1)
+
+    def has_arrived(batch: Batch) -> NDArray[np.bool_]:
+        near: NDArray[np.bool_] = np.linalg.norm(ball(batch)[:, ::2] - own.goal, axis=1) < ARRIVED * own.cell
+        return near & (ball(batch)[:, 1] > 0)
+
+    def has_fallen(batch: Batch) -> NDArray[np.bool_]:
+        low: NDArray[np.bool_] = ball(batch)[:, 1] < 0
+        return low
+
+    def act(batch: Batch, actions: NDArray[Any]) -> None:
+        # From the poses alone, so that worlds that do not step remember nothing of it.
+        tilts = _tilts(batch.rotation[:, 0].astype(np.float64))
+        wanted = tilts + np.clip(steepest * np.clip(actions, -1, 1) - tilts, -reach, reach)
+        right, front = wanted.T / 2
+        turn = np.stack([np.sin(front) * np.cos(right), np.sin(front) * np.sin(right), -np.cos(front) * np.sin(right)], axis=1)
+        target = np.concatenate([turn, (np.cos(front) * np.cos(right))[:, None]], axis=1)
+        # The turn from now to the target, about an axis of the world.
+        axis, w = -batch.rotation[:, 0, :3].astype(np.float64), batch.rotation[:, 0, 3:].astype(np.float64)
+        between = target[:, 3:] * axis + w * target[:, :3] + np.cross(target[:, :3], axis)
+        speeds = np.repeat((2 * between / time)[:, None], len(BOARD), axis=1)
+        batch.set_state(bodies=BOARD, angular_velocity=speeds)
+
+    def start(rng: np.random.Generator, batch: Batch, world: int) -> None:
+        x, z = own.start + rng.uniform(-0.01, 0.01, 2)
+        batch.set_state(worlds=[world], bodies=[BALL], position=[[[x, own.radius, z]]])
+
+    def reward(batch: Batch, actions: NDArray[Any]) -> NDArray[Any]:
+        ends = has_arrived(batch).astype(float) - has_fallen(batch)
+        rewards: NDArray[Any] = ends - 1e-3 * own.left_at(ball(batch)[:, ::2])
+        return rewards
+
+    return VectorEnv(
+        batch,
+        action_space=spaces.Box(-1, 1, (2,), np.float32),
+        observe=observe,
+        reward=reward,
+        act=act,
+        terminated=lambda batch: has_arrived(batch) | has_fallen(batch),
+        start=start,
+        max_steps=max_steps,
+        frame_skip=MAZE_SKIP,
+        autoreset_mode=autoreset_mode,
+    )
+
+
+DECK, WHEEL, TRACK = 4.0, 0.2, 0.4
+# Of the winch and of the wheels (rad/s), and the most torque of each (N m).
+WINCH, DRIVE = (0.4, 1.2e4), (15.0, 60.0)
+
+
+def _cart_and_drawbridge() -> Scene:
+    world = World()
+    world.add(Body.fixed("road").cuboid(3, 1, 1).friction(1).groups(1, 4).at(-3, -1, 0))
+    world.add(Body.fixed("far road").cuboid(3, 1, 1).friction(1).groups(1, 4).at(DECK + 3, -1, 0))
+    half = DECK / 2 - 0.01
+    deck = world.add(Body.dynamic("deck").cuboid(half, 0.1, 1).mass(200).friction(1).groups(2, 4).at(DECK / 2, -0.1, 0))
+    cart = world.add(Body.dynamic("cart").cuboid(0.5, 0.1, 0.15).mass(30).groups(4, 3).at(-2, 0.3, 0))
+    world.join(Joint(deck).hinge((0, 0, 1)).at(0, -0.1, 0).limited(0, 1.2).motor(0, WINCH[1]))
+    for x in (-TRACK, TRACK):
+        for z in (-TRACK, TRACK):
+            wheel = Body.dynamic(f"wheel {x:+g} {z:+g}").ball(WHEEL).mass(3).friction(1).groups(4, 3).at(x - 2, WHEEL, z)
+            world.join(Joint(world.add(wheel), cart).hinge((0, 0, 1)).at(x - 2, WHEEL, z).motor(0, DRIVE[1]))
+    return Scene.from_world(world, dt=1 / 60, name="cart and drawbridge")
+
+
+def cart_on_drawbridge(
+    num_envs: int,
+    *,
+    max_steps: int = 400,
+    num_threads: int = 0,
+    autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+) -> VectorEnv:
+    """Lower a drawbridge of 4 m by its winch, and drive a cart of four wheels over it to the far road.
+
+    Actions: speed of the winch (1 is 0.4 rad/s up) and of the wheels (1 is 15 rad/s ahead). An action lasts 1/30 s. Observations: place and velocity
+    of the cart along and up (m, m/s), its angle and that of the deck, and how fast both turn (rad, rad/s). Each episode draws how far the deck
+    is up, 0.2 to 1 rad. An episode ends on the far road (reward 10) or below the roads; an action has the reward of the way ahead (m).
+
+    >>> from drystone.gym import cart_on_drawbridge
+    >>> envs = cart_on_drawbridge(2)
+    >>> observations, _ = envs.reset(seed=1)
+    >>> observations.shape, envs.single_action_space.shape
+    ((2, 8), (2,))
+    """
+    scene = _cart_and_drawbridge()
+    batch = Batch(scene, num_envs, config=Config(sleep=False), num_threads=num_threads)
+    deck, cart = scene.bodies.index("deck"), scene.bodies.index("cart")
+    skip = 2
+
+    def angle(batch: Batch, body: int) -> NDArray[Any]:
+        return 2 * np.arctan2(batch.rotation[:, body, 2], batch.rotation[:, body, 3])
+
+    def observe(batch: Batch) -> NDArray[Any]:
+        turning = batch.angular_velocity[:, [cart, deck], 2]
+        angles = np.stack([angle(batch, cart), angle(batch, deck)], axis=1)
+        return np.concatenate([batch.position[:, cart, :2], batch.linear_velocity[:, cart, :2], angles, turning], axis=1)
+
+    def is_over(batch: Batch) -> NDArray[np.bool_]:
+        return (batch.position[:, cart, 0] > DECK + 1) & (batch.position[:, cart, 1] > 0)
+
+    def act(batch: Batch, actions: NDArray[Any]) -> None:
+        wanted = np.clip(actions, -1, 1)
+        batch.ctrl[:, 0] = WINCH[0] * wanted[:, 0]
+        # What rolls ahead turns against the axis of its hinge.
+        batch.ctrl[:, 1:] = -DRIVE[0] * wanted[:, 1:]
+
+    def start(rng: np.random.Generator, batch: Batch, world: int) -> None:
+        up = rng.uniform(0.2, 1.0)
+        place = [DECK / 2 * np.cos(up), DECK / 2 * np.sin(up) - 0.1, 0]
+        rotation = [0, 0, np.sin(up / 2), np.cos(up / 2)]
+        batch.set_state(worlds=[world], bodies=[deck], position=[[place]], rotation=[[rotation]])
+
+    def reward(batch: Batch, actions: NDArray[Any]) -> NDArray[Any]:
+        ahead: NDArray[Any] = batch.linear_velocity[:, cart, 0] * (skip * scene.dt)
+        return ahead + 10 * is_over(batch)
+
+    return VectorEnv(
+        batch,
+        action_space=spaces.Box(-1, 1, (2,), np.float32),
+        observe=observe,
+        reward=reward,
+        act=act,
+        terminated=lambda batch: is_over(batch) | (batch.position[:, cart, 1] < -1),
+        start=start,
+        max_steps=max_steps,
+        frame_skip=skip,
         autoreset_mode=autoreset_mode,
     )

@@ -59,16 +59,15 @@ def map_svg(
     parts = []
     for (a, b), mean in cells.items():
         share = min(1.0, max(0.0, (mean - low) / (high - low)))
-        color = "#" + "".join(f"{round(p + (q - p) * share):02x}" for p, q in zip(LOW, HIGH, strict=True))
         px, py = left + CELL * across.index(a), top + CELL * (len(up) - 1 - up.index(b))
-        parts.append(f'<rect x="{px}" y="{py}" width="{CELL}" height="{CELL}" fill="{color}" stroke="#fff"/>')
+        parts.append(f'<rect x="{px}" y="{py}" width="{CELL}" height="{CELL}" fill="{color_of(share)}" stroke="#fff"/>')
         ink = "#fff" if share > 0.5 else "#000"
-        parts.append(_text(px + CELL / 2, py + CELL / 2 + 4, f"{mean:.2g}", ink))
+        parts.append(text(px + CELL / 2, py + CELL / 2 + 4, f"{mean:.2g}", ink))
     bottom = top + CELL * len(up)
-    parts += [_text(left + CELL * (k + 0.5), bottom + 16, f"{a:g}") for k, a in enumerate(across)]
-    parts += [_text(left - 24, bottom - CELL * (k + 0.5) + 4, f"{b:g}") for k, b in enumerate(up)]
-    parts += [_text(left + CELL * len(across) / 2, bottom + 36, x), _text(30, top - 10, y)]
-    parts.append(_text(left + CELL * len(across) / 2, 20, title or value))
+    parts += [text(left + CELL * (k + 0.5), bottom + 16, f"{a:g}") for k, a in enumerate(across)]
+    parts += [text(left - 24, bottom - CELL * (k + 0.5) + 4, f"{b:g}") for k, b in enumerate(up)]
+    parts += [text(left + CELL * len(across) / 2, bottom + 36, x), text(30, top - 10, y)]
+    parts.append(text(left + CELL * len(across) / 2, 20, title or value))
     size = f'width="{left + CELL * len(across) + 20}" height="{bottom + 50}"'
     style = 'font-family="sans-serif" font-size="12" text-anchor="middle"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} {style}>\n' + "\n".join(parts) + "\n</svg>\n"
@@ -106,6 +105,12 @@ def table(rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str) -> str:
     return "\n".join(lines)
 
 
-def _text(x: float, y: float, text: str, color: str = "#000") -> str:
-    safe = text.replace("&", "&amp;").replace("<", "&lt;")
+def color_of(share: float) -> str:
+    """The color of a share from 0 to 1."""
+    return "#" + "".join(f"{round(p + (q - p) * share):02x}" for p, q in zip(LOW, HIGH, strict=True))
+
+
+def text(x: float, y: float, words: str, color: str = "#000") -> str:
+    """Words around a place of a picture."""
+    safe = words.replace("&", "&amp;").replace("<", "&lt;")
     return f'<text x="{x:g}" y="{y:g}" fill="{color}">{safe}</text>'

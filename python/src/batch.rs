@@ -7,16 +7,18 @@ use drystone::batch::{Column, Contacts, Measure, Member, Run, write};
 use drystone::glam::Vec3;
 use drystone::queries::Filter;
 use drystone::{Listen, Result as Outcome, World};
-use numpy::ndarray::Array2;
+use drystone_view::Look;
+use numpy::ndarray::{Array2, Array3};
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray3, PyReadwriteArray1, PyReadwriteArray2,
-    PyReadwriteArray3,
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3, PyReadwriteArray1,
+    PyReadwriteArray2, PyReadwriteArray3,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::columns::{InputParts, Inputs, Named, OutputParts, Outputs, Record, RecordArray, parts};
+use crate::picture::picture;
 use crate::raised;
 use crate::scene::{Config, Scene};
 
@@ -230,6 +232,23 @@ impl Batch {
                 }
             }
         })
+    }
+
+    /// Red, green and blue of the pixels of a world; angles of the camera in radians.
+    fn picture<'py>(
+        &self,
+        py: Python<'py>,
+        world: usize,
+        size: (u32, u32),
+        yaw: f32,
+        pitch: f32,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let pixels = py.detach(|| {
+            let world = self.lock().world(world).simulation().world.clone();
+            picture(&world, size, Look { yaw, pitch })
+        });
+        let pixels = Array3::from_shape_vec((size.1 as usize, size.0 as usize, 3), pixels.map_err(raised)?);
+        pixels.map(|pixels| pixels.into_pyarray(py)).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
     fn reset(&self, py: Python<'_>, worlds: Worlds<'_>) -> PyResult<()> {

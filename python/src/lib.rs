@@ -5,6 +5,8 @@
 
 mod batch;
 mod columns;
+mod families;
+mod picture;
 mod scene;
 
 use std::ffi::OsString;
@@ -14,6 +16,12 @@ use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(drystone, InternalError, PyRuntimeError, "A defect of drystone.");
+pyo3::create_exception!(
+    drystone,
+    AdapterError,
+    PyRuntimeError,
+    "No graphics adapter, neither a GPU nor a software driver, or one that lacks a needed feature."
+);
 
 /// Converts an error of the library to a Python exception.
 pub fn raised(error: drystone::Error) -> PyErr {
@@ -22,6 +30,7 @@ pub fn raised(error: drystone::Error) -> PyErr {
     match error {
         Error::Input(_) => PyValueError::new_err(line),
         Error::File { .. } => PyOSError::new_err(line),
+        Error::Adapter(_) => AdapterError::new_err(line),
         Error::Panicked(_) => InternalError::new_err(line),
         _ => PyRuntimeError::new_err(line),
     }
@@ -38,11 +47,15 @@ fn command(py: Python<'_>, words: Vec<OsString>) -> u8 {
 #[pymodule(gil_used = false)]
 mod _drystone {
     #[pymodule_export]
-    use super::InternalError;
-    #[pymodule_export]
     use super::batch::{Batch, State};
     #[pymodule_export]
     use super::command;
     #[pymodule_export]
+    use super::families::{family_names, judge, wilson};
+    #[pymodule_export]
+    use super::picture::{boards, maze};
+    #[pymodule_export]
     use super::scene::{Config, Scene, catalogue, schema};
+    #[pymodule_export]
+    use super::{AdapterError, InternalError};
 }

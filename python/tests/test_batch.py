@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import drystone as ds
+from drystone._batch import MEASURES
 
 SCENES = [("tower", {"n": 5}), ("pile", {"n": 27}), ("bridge", {"planks": 6, "boxes": 2}), ("drawbridge", {})]
 
@@ -321,3 +322,75 @@ def test_a_pendulum_built_by_hand_keeps_its_energy() -> None:
     mass = 1000 * 4 / 3 * np.pi * 0.1**3
     assert batch.joint_position.shape == (1, 1, 6) and batch.position[0, 0, 1] < 0
     assert np.ptp(energy) < 1e-3 * mass * 9.81
+
+
+def test_residuals_fall_with_substeps_and_are_nan_with_joints() -> None:
+    names = [name for name in MEASURES if name.startswith("residual")]
+    config = ds.Config(sleep=False)
+    batch = ds.Batch(ds.Scene.find("pile", n=27), 2, config=config)
+    batch.step(60)
+    before = batch.hash()
+    values = batch.measure(*names)
+    assert len(names) == 4 and (before == batch.hash()).all()
+    assert all(np.isfinite(value).all() and value[0] == value[1] for value in values.values())
+    assert 0 < values["residual_velocity"][0] < 0.5
+    # A rollout records them, and goes where it went.
+    out = batch.rollout(10, every=5, record=["residual_velocity"], worlds=[0])
+    batch.step(10, worlds=[1])
+    assert out["residual_velocity"].shape == (1, 2) and batch.hash()[0] == batch.hash()[1]
+    jointed = ds.Batch(ds.Scene.find("drawbridge"))
+    assert all(np.isnan(value).all() for value in jointed.measure(*names).values())
+
+
+def test_masses_are_scaled_from_those_of_the_start() -> None:
+    batch = ds.Batch(ds.Scene.find("tower", n=3), 2, config=ds.Config(sleep=False))
+    batch.set_material(worlds=[1], bodies=[3], mass_scale=[[3]])
+    batch.set_material(worlds=[1], bodies=[3], mass_scale=[[9]])
+    assert batch.mass_scale.tolist() == [[1, 1, 1, 1], [1, 1, 1, 9]]
+    # The same impulse gives a ninth of the speed.
+    batch.apply_impulse(np.full((2, 1, 3), [90, 0, 0]), bodies=[3])
+    assert batch.linear_velocity[0, 3, 0] == pytest.approx(9 * batch.linear_velocity[1, 3, 0])
+    state = batch.snapshot([1])
+    batch.restore(state, [0])
+    batch.step(20)
+    assert batch.mass_scale[0, 3] == 9 and batch.hash()[0] == batch.hash()[1]
+    batch.reset([1])
+    assert batch.mass_scale[1, 3] == 1
+    with pytest.raises(ValueError, match="^mass_scale = 0 of a body of .* kg: must give 1e-15 to 1e15 kg$"):
+        batch.set_material(mass_scale=np.zeros((2, 4)))
+    with pytest.raises(ValueError, match="^mass_scale has shape"):
+        batch.set_material(mass_scale=[1, 2])
+
+
+def test_a_scene_whose_bodies_come_and_go_is_refused_by_name() -> None:
+    with pytest.raises(ValueError, match="^conveyor: bodies come or leave by themselves, and a batch has worlds of constant bodies$"):
+        ds.Batch(ds.Scene.find("conveyor"))
+
+
+def test_a_picture_shows_the_world_as_it_is() -> None:
+    batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
+    try:
+        first = batch.picture(0, 160, 120)
+    except ds.AdapterError as error:
+        pytest.skip(str(error))
+    assert first.shape == (120, 160, 3) and first.dtype == np.uint8 and len(np.unique(first.reshape(-1, 3), axis=0)) > 20
+    before = batch.hash()
+    assert np.array_equal(first, batch.picture(1, 160, 120)) and (before == batch.hash()).all()
+    batch.set_state(worlds=[1], bodies=[3], position=[[[2, 0.5, 0]]])
+    assert not np.array_equal(first, batch.picture(1, 160, 120))
+    assert not np.array_equal(first, batch.picture(0, 160, 120, yaw=80))
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({"world": 2}, "world has 2: must be 0 to 1"),
+        ({"width": 0}, "width = 0: must be 1 or more"),
+        ({"height": 10**6}, "height = 1000000: must be at most 8192"),
+        ({"yaw": float("nan")}, "yaw = nan: must be finite"),
+    ],
+)
+def test_a_picture_names_wrong_arguments(options: dict, line: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        ds.Batch(ds.Scene.find("tower", n=1), 2).picture(**options)
+    assert str(caught.value) == line

@@ -10,10 +10,10 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 from gymnasium.wrappers.vector import RecordEpisodeStatistics  # noqa: E402
 
-from drystone.gym import Env, VectorEnv, cart_pole, drawbridge  # noqa: E402
+from drystone.gym import Env, VectorEnv, cart_on_drawbridge, cart_pole, drawbridge, maze  # noqa: E402
 
-MAKERS = [cart_pole, drawbridge]
-ACTIONS = {cart_pole: 1, drawbridge: 2}
+MAKERS = [cart_pole, drawbridge, maze, cart_on_drawbridge]
+ACTIONS = {cart_pole: 1, drawbridge: 2, maze: 2, cart_on_drawbridge: 2}
 
 
 def actions_of(make, steps: int, worlds: int) -> np.ndarray:
@@ -146,3 +146,52 @@ def test_wrappers_and_wrong_arguments() -> None:
             reward=lambda batch, actions: np.zeros(4),
             act=lambda batch, actions: None,
         )
+
+
+def test_a_board_tilts_as_wanted_and_the_ball_rolls_that_way() -> None:
+    envs = maze(2, board="easy")
+    first, _ = envs.reset(seed=1)
+    assert np.allclose(first[:, 4:6], 0, atol=1e-6) and not np.array_equal(first[0], first[1])
+    steepest = np.radians(8)
+    for _ in range(8):
+        observations, *_ = envs.step(np.array([[1, 0], [0, 0.5]], np.float32))
+    assert observations[0, 4] == pytest.approx(steepest, abs=2e-3) and observations[0, 5] == pytest.approx(0, abs=2e-3)
+    assert observations[1, 5] == pytest.approx(steepest / 2, abs=2e-3)
+    assert observations[0, 0] > first[0, 0] + 0.01 and observations[1, 1] > first[1, 1] + 0.005
+
+
+def test_a_controller_wins_the_easy_board() -> None:
+    from drystone.gym import _Board
+
+    board, envs = _Board("easy"), maze(1, board="easy", max_steps=1200)
+    observations, _ = envs.reset(seed=3)
+    total = 0.0
+    for _ in range(1200):
+        at, speed = observations[0, :2], observations[0, 2:4]
+        place = np.floor(at[::-1] / board.cell + 0.5 * board.size).astype(int)
+        ways = [place + step for step in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))]
+        inside = [way for way in ways if (way >= 0).all() and (way < board.size).all()]
+        aim = board.middle(min(inside, key=lambda way: board.left[tuple(way)]))
+        slope = (9 * (aim - at) - 5 * speed) / 7
+        observations, rewards, terminated, _, _ = envs.step(np.clip(np.degrees(slope) / 8, -1, 1)[None].astype(np.float32))
+        total += rewards[0]
+        if terminated[0]:
+            break
+    assert terminated[0] and rewards[0] == pytest.approx(1, abs=0.01)
+    with pytest.raises(ValueError, match="^board: \"esy\" is no board and no file; did you mean \"easy\"\\?"):
+        maze(1, board="esy")
+
+
+def test_a_cart_that_lowers_the_bridge_crosses_it_and_one_that_does_not_does_not() -> None:
+    envs = cart_on_drawbridge(2, max_steps=400, autoreset_mode=AutoresetMode.DISABLED)
+    envs.reset(seed=1)
+    total, crossed = np.zeros(2), np.zeros(2, bool)
+    for step in range(300):
+        # The first one lowers the deck, then drives; the second one drives at once with the deck up.
+        ahead = 1.0 if step > 120 else 0.0
+        _, rewards, terminated, _, _ = envs.step(np.array([[-1, ahead], [1, 1]], np.float32))
+        total += rewards
+        crossed |= terminated
+        if crossed.any():
+            break
+    assert crossed.tolist() == [True, False] and total[0] > 15

@@ -1,11 +1,13 @@
 //! Columns of numbers: a row for each body, joint or drive of a world.
 
+use std::sync::Arc;
+
 use glam::{Quat, Vec3};
 
 use super::Member;
 use crate::error::{Result, ensure, input};
 use crate::names::named;
-use crate::world::{Axis, Drive, Joint, Linear, World};
+use crate::world::{Axis, Body, Drive, Joint, Linear, MassProperties, World};
 
 /// A kind of numbers of a world, with a row for each body, joint, drive or world. See [`Member::read`].
 ///
@@ -43,6 +45,8 @@ pub enum Column {
     Friction,
     /// Restitution coefficient of each body.
     Restitution,
+    /// Mass of each body, with its moments of inertia, over that at the start of the world; 1 of a body without mass, which keeps none.
+    MassScale,
     /// Gravity of the world (m/s²).
     Gravity,
     /// Speed of each motor and target of each spring, in the order of [`drives`].
@@ -66,6 +70,7 @@ named!(Column {
     Torque = "torque",
     Friction = "friction",
     Restitution = "restitution",
+    MassScale = "mass_scale",
     Gravity = "gravity",
     Control = "ctrl",
     JointPosition = "joint_position",
@@ -78,7 +83,7 @@ impl Column {
     /// Number of values in a row.
     pub const fn width(self) -> usize {
         match self {
-            Self::Control | Self::Friction | Self::Restitution => 1,
+            Self::Control | Self::Friction | Self::Restitution | Self::MassScale => 1,
             Self::Rotation => 4,
             Self::JointPosition | Self::JointSpeed => 6,
             _ => 3,
@@ -180,6 +185,10 @@ impl Member {
             Column::Torque => put(rows, bodies().map(|b| b.map(|b| b.torque.to_array()))),
             Column::Friction => put(rows, bodies().map(|b| b.map(|b| [b.material.friction]))),
             Column::Restitution => put(rows, bodies().map(|b| b.map(|b| [b.material.restitution]))),
+            Column::MassScale => {
+                let first = self.start().world();
+                put(rows, bodies().enumerate().map(|(i, body)| body.map(|body| [scale_of(body, first.bodies.get(i))])));
+            }
             Column::Gravity => put(rows, [Some(world.gravity_of(0).to_array())]),
             Column::Control => put(rows, world.joints.iter().flat_map(aims).map(|aim| Some([aim]))),
             Column::JointPosition => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).position))),
@@ -191,15 +200,46 @@ impl Member {
         }
     }
 
-    /// Sets a column: poses, velocities, forces, torques, materials, gravity or drives. Rows of vacant bodies are
+    /// Sets a column: poses, velocities, forces, torques, materials, masses, gravity or drives. Rows of vacant bodies are
     /// skipped. Contacts that still touch keep their impulses, and so do joints.
     ///
     /// # Errors
     /// The column is derived from others and cannot be written, or there are fewer numbers than it has. The next step
     /// checks the values.
     pub fn write(&mut self, column: Column, values: &[f32]) -> Result<()> {
+        if column == Column::MassScale {
+            return self.scale_masses(values);
+        }
         write(&mut self.simulation_mut().world, column, values)
     }
+
+    fn scale_masses(&mut self, scales: &[f32]) -> Result<()> {
+        let start = Arc::clone(self.start());
+        let bodies = &mut self.simulation_mut().world.bodies;
+        ensure(scales.len() >= bodies.len(), || {
+            format!("mass_scale has {} numbers: must be {}", scales.len(), bodies.len())
+        })?;
+        for (i, &scale) in scales.iter().enumerate().take(bodies.len()) {
+            let first = start.world().bodies.get(i).filter(|first| first.mass.mass > 0.0);
+            let Some(first) = first.filter(|_| !bodies.is_vacant(i)) else { continue };
+            // What does not change keeps its bits.
+            if scale == scale_of(&bodies[i], Some(first)) {
+                continue;
+            }
+            let mass = first.mass.mass * scale;
+            ensure(MassProperties::MASSES.contains(&mass), || {
+                format!("mass_scale = {scale} of a body of {} kg: must give 1e-15 to 1e15 kg", first.mass.mass)
+            })?;
+            bodies[i].mass.mass = mass;
+            bodies[i].mass.principal_inertia = first.mass.principal_inertia * scale;
+        }
+        Ok(())
+    }
+}
+
+/// The mass of a body over that which it had first.
+fn scale_of(body: &Body, first: Option<&Body>) -> f32 {
+    first.filter(|first| first.mass.mass > 0.0).map_or(1.0, |first| body.mass.mass / first.mass.mass)
 }
 
 /// [`Member::write`] for a world.

@@ -3,8 +3,10 @@
 use glam::DVec3;
 
 use super::Member;
+use crate::backend::cpu::Cpu;
 use crate::metrics::{self, Penetration};
 use crate::names::named;
+use crate::residuals::Residuals;
 
 /// A measure of the solution error or of the content of a world: see [`Member::measure`].
 ///
@@ -61,6 +63,15 @@ pub enum Measure {
     Asleep,
     /// 1 if all numbers are finite, else 0.
     Finite,
+    /// How far the first substep of the next step leaves impulses from solving its contacts, in velocities ([`Residuals::e_vel`]). The step is made on
+    /// a copy. NaN of a world with joints, as the three that follow.
+    ResidualVelocity,
+    /// Farthest that an impulse is outside of its cone of friction ([`Residuals::cone`], N s).
+    ResidualCone,
+    /// Largest impulse of a contact times the speed at which it parts ([`Residuals::compl`], J).
+    ResidualComplementarity,
+    /// Largest power of friction that does not oppose its slip ([`Residuals::diss`], J).
+    ResidualDissipation,
 }
 
 named!(Measure {
@@ -82,10 +93,14 @@ named!(Measure {
     Contacts = "contacts",
     Asleep = "asleep",
     Finite = "finite",
+    ResidualVelocity = "residual_velocity",
+    ResidualCone = "residual_cone",
+    ResidualComplementarity = "residual_complementarity",
+    ResidualDissipation = "residual_dissipation",
 });
 
 impl Member {
-    /// Measures of the world. The three measures of overlap are computed together.
+    /// Measures of the world. The three measures of overlap are computed together, and so are the residuals.
     pub fn measure<const N: usize>(&self, measures: [Measure; N]) -> [f64; N] {
         let mut values = [0.0; N];
         self.measure_into(&measures, &mut values);
@@ -94,13 +109,29 @@ impl Member {
 
     /// The same, into a slice.
     pub fn measure_into(&self, measures: &[Measure], values: &mut [f64]) {
-        let mut known: Option<Penetration> = None;
+        let (mut overlap, mut residuals): (Option<Penetration>, Option<Option<Residuals>>) = (None, None);
         for (measure, value) in measures.iter().zip(values) {
-            *value = self.one(*measure, || *known.get_or_insert_with(|| self.simulation().penetration()));
+            let overlap = || *overlap.get_or_insert_with(|| self.simulation().penetration());
+            *value = self.one(*measure, overlap, || *residuals.get_or_insert_with(|| self.residuals()));
         }
     }
 
-    fn one(&self, measure: Measure, mut overlap: impl FnMut() -> Penetration) -> f64 {
+    /// Those of the next step, made on a copy; none of a world with joints, or where the step fails.
+    fn residuals(&self) -> Option<Residuals> {
+        if !self.simulation().world.joints.is_empty() {
+            return None;
+        }
+        let mut copy = self.simulation().fork(Box::new(Cpu::new()));
+        copy.step_with_residuals(self.dt()).ok()
+    }
+
+    fn one(
+        &self,
+        measure: Measure,
+        mut overlap: impl FnMut() -> Penetration,
+        mut residuals: impl FnMut() -> Option<Residuals>,
+    ) -> f64 {
+        let mut residual = |of: fn(Residuals) -> f64| residuals().map_or(f64::NAN, of);
         let world = &self.simulation().world;
         let momentum = |k: usize| DVec3::to_array(&world.linear_momentum())[k];
         let turning = |k: usize| DVec3::to_array(&world.angular_momentum())[k];
@@ -122,6 +153,10 @@ impl Member {
             Measure::EnergyTaken => self.stats().energy_taken,
             Measure::Contacts => self.simulation().contacts().count() as f64,
             Measure::Asleep => (0..world.bodies.len()).filter(|&i| self.simulation().is_asleep(i)).count() as f64,
+            Measure::ResidualVelocity => residual(|all| all.e_vel),
+            Measure::ResidualCone => residual(|all| all.cone),
+            Measure::ResidualComplementarity => residual(|all| all.compl),
+            Measure::ResidualDissipation => residual(|all| all.diss),
             Measure::Finite => f64::from(u8::from(world.first_non_finite().is_none())),
         }
     }

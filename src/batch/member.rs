@@ -60,7 +60,7 @@ impl Member {
     pub(super) fn new(scene: &Scene, config: &SolverConfig) -> Result<Self> {
         let comes_and_goes = !scene.spawners.is_empty() || !scene.leaving.is_empty();
         ensure(!comes_and_goes, || {
-            format!("{}: has spawners or leaving bodies, which a batch does not support", scene.name)
+            format!("{}: bodies come or leave by themselves, and a batch has worlds of constant bodies", scene.name)
         })?;
         let worlds = scene.world.world_count();
         ensure(worlds == 1, || format!("{}: {worlds} worlds beside each other: must be one", scene.name))?;

@@ -311,6 +311,64 @@ fn contacts_and_measures_do_not_depend_on_neighbors_and_threads() {
 }
 
 #[test]
+fn residuals_are_those_of_the_next_step_and_the_world_stays_as_it_is() {
+    let measures = [Measure::ResidualVelocity, Measure::ResidualCone, Measure::ResidualDissipation];
+    let scene = scene("pile", &["n=27"]);
+    let of = |substeps: u32| {
+        let config = SolverConfig::default().with(|c| (c.substeps, c.max_substeps) = (substeps, substeps));
+        let mut batch = Batch::of(&scene, &config, 2).expect("worlds");
+        assert!(batch.step(40, &[0, 1]).expect("worlds").is_empty());
+        let before = batch.world(0).hash();
+        let values = batch.world(0).measure(measures);
+        assert_eq!(batch.world(0).hash(), before);
+        let mut simulation = batch.world(0).simulation().fork(Box::new(Cpu::new()));
+        let residuals = simulation.step_with_residuals(scene.dt).expect("a step");
+        assert_eq!(values, [residuals.e_vel, residuals.cone, residuals.diss]);
+        batch.step(5, &[0, 1]).expect("worlds");
+        assert_eq!(batch.world(0).hash(), batch.world(1).hash(), "a measure changes nothing");
+        values
+    };
+    let [velocity, cone, dissipation] = of(8);
+    assert!(velocity > 0.0 && velocity < 0.5 && cone.is_finite() && dissipation.is_finite(), "{velocity}");
+    let jointed = Batch::of(&self::scene("drawbridge", &[]), &SolverConfig::default(), 1).expect("a world");
+    assert!(jointed.world(0).measure(measures).iter().all(|value| value.is_nan()));
+}
+
+#[test]
+fn asleep_a_world_has_no_residuals() {
+    let mut batch = Batch::of(&scene("tower", &["n=2"]), &SolverConfig::default(), 1).expect("a world");
+    batch.step(300, &[0]).expect("a world");
+    let [asleep, velocity] = batch.world(0).measure([Measure::Asleep, Measure::ResidualVelocity]);
+    assert_eq!((asleep, velocity), (2.0, 0.0));
+}
+
+#[test]
+fn a_mass_is_scaled_from_that_of_the_start_and_no_other_changes() {
+    let mut batch = Batch::of(&scene("tower", &["n=3"]), &SolverConfig::default(), 2).expect("worlds");
+    let first = batch.world(0).simulation().world.bodies[2].mass;
+    for scale in [0.3, 7.0, 2.0] {
+        let mut scales = [0.0; 4];
+        batch.world(1).read(Column::MassScale, &mut scales);
+        scales[2] = scale;
+        batch.world_mut(1).write(Column::MassScale, &scales).expect("a mass");
+    }
+    let bodies = &batch.world(1).simulation().world.bodies;
+    assert_eq!(
+        (bodies[2].mass.mass, bodies[2].mass.principal_inertia),
+        (2.0 * first.mass, 2.0 * first.principal_inertia)
+    );
+    assert_eq!((bodies[1].mass, bodies[0].mass.mass), (first, 0.0));
+    for bad in [0.0, -1.0, 1e30, f32::NAN] {
+        let error = batch.world_mut(1).write(Column::MassScale, &[1.0, 1.0, bad, 1.0]).expect_err("no mass");
+        assert!(error.to_string().contains("mass_scale"), "{error}");
+    }
+    assert!(batch.step(30, &[0, 1]).expect("worlds").is_empty());
+    assert_ne!(batch.world(0).hash(), batch.world(1).hash());
+    batch.reset(&[1]).expect("a world");
+    assert_eq!(batch.world(1).simulation().world.bodies[2].mass, first);
+}
+
+#[test]
 fn a_joint_that_breaks_leaves_its_columns_empty() {
     let mut scene = scene("sphere-plane", &[]);
     scene.world.join(Joint::to_world(1, Vec3::ZERO, Vec3::new(0.0, 2.5, 0.0)).breaking_at(1.0));

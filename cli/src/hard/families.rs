@@ -7,8 +7,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use cpu_time::ThreadTime;
 use drystone::scenes::{Family, Law, Member};
 use drystone::stats::{largest, median};
-use drystone::{Error, Result, Scene, World, metrics};
+use drystone::{Error, Result, Scene, Simulation, StepStats, World, metrics};
 use glam::Vec3;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{Check, Checks, LEAST, Setup, energy, passes};
 
@@ -19,6 +20,8 @@ pub struct Judged {
     pub checks: Vec<Check>,
     /// Processor time of the median step, divided by the number of movable bodies (ms).
     pub ms: f64,
+    /// Processor time of all steps over the time of the world (s a second).
+    pub seconds: f64,
 }
 
 /// The worlds of one family.
@@ -55,7 +58,7 @@ impl FamilyShare {
 
 /// The 95 % confidence interval of a share, if `passed` of `count` draws passed (E. B. Wilson, "Probable inference, the
 /// law of succession, and statistical inference", 1927).
-fn wilson(passed: usize, count: usize) -> [f64; 2] {
+pub fn wilson(passed: usize, count: usize) -> [f64; 2] {
     /// 97.5 % of a normal distribution are below this number of standard deviations.
     const Z: f64 = 1.959_964;
     let n = count as f64;
@@ -93,11 +96,7 @@ pub fn judge_all(
         families.iter().flat_map(|&family| seeds.iter().map(move |&seed| (family, seed))).collect();
     let (next, judged) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || -> Result<()> {
-        // The steps of a world use the threads of the pool that they run in.
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build()
-            .map_err(|e| Error::input(format!("a thread: {e}")))?;
+        let pool = one_thread()?;
         while let Some(&(family, seed)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
             let Member { scene, law } = family.member(seed)?;
             let world = pool.install(|| judge(&scene, &law, setup)).map_err(|e| e.within(family.spec(seed)))?;
@@ -121,6 +120,14 @@ pub fn judge_all(
             FamilyShare { family, worlds }
         })
         .collect())
+}
+
+/// Makes a pool of one thread. The steps of a world use the threads of the pool that they run in.
+///
+/// # Errors
+/// The system refuses to start a thread.
+pub fn one_thread() -> Result<ThreadPool> {
+    ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::input(format!("a thread: {e}")))
 }
 
 /// Speed at which a body counts as at rest, divided by that of a fall by its size: its kinetic energy lifts it by 1e-4
@@ -147,15 +154,29 @@ const SETTLED: f64 = 1e-3;
 /// # Errors
 /// The scene cannot be run.
 pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
+    judge_while(scene, law, setup, |_, _| Ok(()))
+}
+
+/// The same, with a look at each step, whose time does not count.
+///
+/// # Errors
+/// The scene cannot be run, or `look` ends the run.
+pub fn judge_while(
+    scene: &Scene,
+    law: &Law,
+    setup: &Setup,
+    mut look: impl FnMut(&Simulation, &StepStats) -> Result<()>,
+) -> Result<Judged> {
     let start = &scene.world;
     let mut simulation = setup.simulation(start.clone())?;
     let mut watch = Watch::new(start);
     let mut times = Vec::with_capacity(scene.steps as usize);
     for step in 1..=scene.steps {
         let begin = ThreadTime::now();
-        simulation.step(scene.dt)?;
+        let stats = simulation.step(scene.dt)?;
         times.push(1e3 * begin.elapsed().as_secs_f64());
         watch.look(law, &simulation.world, f64::from(step) * f64::from(scene.dt));
+        look(&simulation, &stats)?;
     }
     let end = &simulation.world;
     let mut checks = Checks::default();
@@ -195,7 +216,8 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
         _ => return Err(Error::input(format!("{law:?}: no judge knows this law"))),
     }
     checks.finite("", end);
-    Ok(Judged { seed: 0, checks: checks.0, ms: median(&times) / start.dynamic_count() as f64 })
+    let seconds = 1e-3 * times.iter().sum::<f64>() / (f64::from(scene.steps) * f64::from(scene.dt));
+    Ok(Judged { seed: 0, checks: checks.0, ms: median(&times) / start.dynamic_count() as f64, seconds })
 }
 
 /// Quantities over all steps that laws refer to.

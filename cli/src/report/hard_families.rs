@@ -88,7 +88,10 @@ mod tests {
         };
         FamilyShare {
             family,
-            worlds: seeds.iter().map(|&seed| Judged { seed, checks: vec![check(seed)], ms: 1e-3 }).collect(),
+            worlds: seeds
+                .iter()
+                .map(|&seed| Judged { seed, checks: vec![check(seed)], ms: 1e-3, seconds: 1.0 })
+                .collect(),
         }
     }
 

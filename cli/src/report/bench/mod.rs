@@ -29,11 +29,9 @@ use crate::report::rounds::{interleave, quartiles};
 use crate::report::scene_hash::content_hash;
 use crate::settings;
 use drystone::metrics::rms_speed;
-use drystone::residuals::Residuals;
 use drystone::scenes::Spawners;
-use drystone::stages::plan::Kernel;
 use drystone::stats::median;
-use drystone::{Backend, Error, Reference, Result, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{Backend, Error, Result, Scene, Simulation, SolverConfig, StepStats};
 
 /// The scenes of a full bench, as in [`Scene::find_spec`].
 pub const STANDARD: [&str; 9] = [
@@ -89,7 +87,7 @@ pub struct StagesRow {
     pub penetration_mean: f64,
     /// Root mean square speed (m/s).
     pub speed_rms: f64,
-    /// [`Residuals::e_vel`] of the impulses after a substep in its contact problem without springs; none with joints.
+    /// [`e_vel`](drystone::residuals::Residuals::e_vel) of the impulses after a substep in its contact problem without springs; none with joints.
     pub residual: Option<f64>,
 }
 
@@ -205,7 +203,7 @@ impl Case {
     fn rows(self, config: &SolverConfig) -> Vec<StagesRow> {
         let Self { spec, hash, dt, mut simulation, ways, last: stats, .. } = self;
         let penetration = simulation.penetration();
-        let residual = residual(&mut simulation, dt);
+        let residual = simulation.step_with_residuals(dt).ok().map(|residuals| residuals.e_vel);
         let world = &simulation.world;
         let row = |mut way: Way| {
             let [detect, color, prepare, run, store] = std::array::from_fn(|i| median(&column(&way.turns, i)));
@@ -252,19 +250,4 @@ fn stage_times(stats: &StepStats) -> [f64; 6] {
 
 fn column<const N: usize>(rows: &[[f64; N]], column: usize) -> Vec<f64> {
     rows.iter().map(|row| row[column]).collect()
-}
-
-/// The error of the impulses after the first substep of the next step, which this function makes.
-fn residual(simulation: &mut Simulation, dt: f32) -> Option<f64> {
-    let (mut problem, plan) = simulation.next_problem(dt).ok()?;
-    let begins = |p: &drystone::stages::plan::Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. });
-    let end = plan.passes.iter().skip(1).position(begins).map_or(plan.passes.len(), |i| i + 1);
-    Reference::<f32>::new().run(&mut problem, &plan.passes[..end]).ok()?;
-    let of_contact = |row: &drystone::stages::problem::ContactRow| {
-        let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
-        problem.impulses[own].iter().map(|i| glam::Vec3::new(i.normal, i.tangent_1, i.tangent_2).as_dvec3())
-    };
-    let impulses: Vec<_> = problem.swept_contacts().flat_map(of_contact).collect();
-    let (contacts, _) = simulation.step_with_contacts("bench", dt).ok()?;
-    Some(Residuals::of(&contacts, &impulses).e_vel)
 }
