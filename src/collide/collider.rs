@@ -5,7 +5,6 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
-use super::solid::magnification;
 use crate::math::rotation::squared_length;
 use crate::world::{Body, BodyKind, Collider, Shape, placed};
 
@@ -140,14 +139,16 @@ pub(super) struct CuboidPlace {
     pub rest_of_place: f32,
     /// Half extents (m).
     pub half: Vec3,
-    /// Stands for a distance of zero between faces (m): 2^-50 of the smallest half extent, as a power of two.
+    /// Stands for a distance of zero between faces (m): 2^-40 of the smallest half extent, as a power of two.
     pub least: f32,
     pub rest: [f32; 4],
 }
 
 impl CuboidPlace {
     pub fn new(half: Vec3, position: Vec3, rotation: Quat) -> Self {
-        let least = 2.0_f32.powi(-50) / magnification(half.min_element());
+        // The power of two alone, so that scaled cuboids have scaled distances.
+        let size = f32::from_bits(half.min_element().to_bits() & 0x7f80_0000);
+        let least = 2.0_f32.powi(-40) * size;
         Self { rotation, position, half, least, ..Self::default() }
     }
 

@@ -4,10 +4,7 @@ use glam::Vec3;
 use parry3d::math::Pose;
 use parry3d::query::details::{NormalConstraints, contact_manifold_pfm_pfm};
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
-use parry3d::shape::{
-    Ball, Capsule, Cuboid, PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, SupportMap, Triangle,
-    TypedShape,
-};
+use parry3d::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, SupportMap, TypedShape};
 
 /// parry's manifold, without data of drystone.
 pub(super) type ParryManifold = ContactManifold<(), ()>;
@@ -17,6 +14,10 @@ pub(super) const DEEP: f32 = 0.05;
 /// Distance by which shapes are pushed apart for a second result, relative to the smallest half extent of the thinner
 /// shape.
 pub(super) const PUSH: f32 = 0.02;
+/// Smallest half extent (m) of the thinner shape of a pair that is large compared with parry's tolerances. They are
+/// absolute: parry treats sides as parallel if they span less than 3.5 cm², and its search for a direction stops at a
+/// triangle of 11 cm².
+pub(super) const SMALL: f32 = 1.0 / 64.0;
 /// Error of a distance, relative to the smallest half extent of the thinner shape.
 pub(super) const EXACT: f32 = 1e-3;
 
@@ -104,41 +105,11 @@ impl SupportMap for Patch<'_> {
     }
 }
 
-/// Factor by which parry sees a pair enlarged, if its thinner shape has the smallest half extent `size` (m): the power of two that makes
-/// it 1 to 2 m. Parry's tolerances are absolute: it treats sides as parallel if they span less than 3.5 cm², and its search for a
-/// direction stops at a triangle of 11 cm². So they are the same share of every pair, and a power of two causes no rounding.
+/// Factor by which a pair is enlarged for parry, if its thinner shape has the smallest half extent `size` (m): 1 from
+/// [`SMALL`] on, otherwise a power of two, which causes no rounding.
 pub(super) fn magnification(size: f32) -> f32 {
-    const LARGEST: f32 = (1 << 20) as f32;
-    f32::from_bits(0x7f00_0000 - (size.clamp(1.0 / LARGEST, LARGEST).to_bits() & 0x7f80_0000))
-}
-
-/// An enlarged copy of a shape. Parry has closed forms for some pairs of these, and they have few numbers.
-enum Enlarged {
-    Ball(Ball),
-    Capsule(Capsule),
-    Cuboid(Cuboid),
-    Triangle(Triangle),
-}
-
-impl Enlarged {
-    fn of(shape: &dyn Shape, by: f32) -> Option<Self> {
-        Some(match shape.as_typed_shape() {
-            TypedShape::Ball(ball) => Self::Ball(Ball::new(by * ball.radius)),
-            TypedShape::Capsule(c) => Self::Capsule(Capsule::new(by * c.segment.a, by * c.segment.b, by * c.radius)),
-            TypedShape::Cuboid(cuboid) => Self::Cuboid(Cuboid::new(by * cuboid.half_extents)),
-            TypedShape::Triangle(t) => Self::Triangle(Triangle::new(by * t.a, by * t.b, by * t.c)),
-            _ => return None,
-        })
-    }
-
-    fn shape(&self) -> &dyn Shape {
-        match self {
-            Self::Ball(ball) => ball,
-            Self::Capsule(capsule) => capsule,
-            Self::Cuboid(cuboid) => cuboid,
-            Self::Triangle(triangle) => triangle,
-        }
-    }
+    const LEAST: f32 = 1.0 / (1 << 20) as f32;
+    if size < SMALL { f32::from_bits(0x7f00_0000 - (size.max(LEAST).to_bits() & 0x7f80_0000)) } else { 1.0 }
 }
 
 /// A solid, enlarged by `by`.
@@ -301,19 +272,15 @@ pub(super) fn ask(
     found: &mut ParryManifold,
 ) {
     let by = magnification(size);
-    let large12 = Pose::from_parts(pos12.translation * by, pos12.rotation);
     let has_hull = a.as_convex_polyhedron().is_some() || b.as_convex_polyhedron().is_some();
-    if let (Some(a), Some(b)) = (Enlarged::of(a, by), Enlarged::of(b, by)) {
-        let (a, b, most) = (a.shape(), b.shape(), prediction * by);
-        let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(&large12, a, b, cone, None, most, found);
-    } else if let (Some((a, radius_a)), Some((b, radius_b))) = (features(a, has_hull), features(b, has_hull)) {
-        let [a, b] = [a, b].map(|map| Magnified { map, by });
-        contact_manifold_pfm_pfm(&large12, &a, radius_a * by, cone, &b, radius_b * by, None, prediction * by, found);
-    } else {
-        // A half-space, or a ball beside a cylinder or a cone: no tolerance decides.
+    let features = (features(a, has_hull), features(b, has_hull));
+    let (true, (Some((a, radius_a)), Some((b, radius_b)))) = (by > 1.0, features) else {
         let _ = DefaultQueryDispatcher.contact_manifold_convex_convex(pos12, a, b, cone, None, prediction, found);
         return;
-    }
+    };
+    let pos12 = Pose::from_parts(pos12.translation * by, pos12.rotation);
+    let [a, b] = [a, b].map(|map| Magnified { map, by });
+    contact_manifold_pfm_pfm(&pos12, &a, radius_a * by, cone, &b, radius_b * by, None, prediction * by, found);
     for point in &mut found.points {
         (point.local_p1, point.local_p2, point.dist) = (point.local_p1 / by, point.local_p2 / by, point.dist / by);
     }

@@ -1,5 +1,5 @@
 //! The contacts of cuboids, sixteen pairs at a time, bit for bit equal to parry's `contact_manifold_cuboid_cuboid` for
-//! each pair, if parry sees the pair enlarged by 2^27 or more: beside so large a pair its tolerances, which are absolute
+//! each pair, if parry sees the pair enlarged by 2^17 or more: beside so large a pair its tolerances, which are absolute
 //! lengths, are nothing.
 //!
 //! Parry tests the three face normals of each cuboid and the nine cross products of edges, and takes the direction
