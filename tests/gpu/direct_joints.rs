@@ -391,16 +391,24 @@ fn a_sheet_in_a_plane_stays_together_though_its_loops_hold_it_twice() {
     assert!(simulation.world.bodies[middle].position.y < -0.05, "it did not sag");
 }
 
+/// The ball swings wildly, and rounding decides how far its joint opens: the median of nine starts counts.
 fn a_ball_of_next_to_no_inertia_at_a_long_arm_stays_where_it_is_tied() {
-    let mut world = chain(5, 10.0);
-    let end = world.bodies[5].position;
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.001)).position(end.x + 1.0, end.y, end.z));
-    world.join(Joint::new(5, Vec3::ZERO, ball, -Vec3::X));
-    let mut simulation = simulation(world, JointSolver::Direct);
-    let gap = largest_gap(&mut simulation, 600);
-    println!("{gap} m");
-    assert!(gap < 0.05, "{gap} m");
-    assert!(simulation.world.first_non_finite().is_none());
+    let mut gaps: Vec<f32> = (0..9)
+        .map(|k| {
+            let mut world = chain(5, 10.0);
+            let end = world.bodies[5].position;
+            let ball = Body::dynamic().shape(Shape::ball(0.001)).position(end.x + 1.0, end.y, end.z);
+            let ball = world.add(ball.velocity(k as f32 * 1e-4 * Vec3::Z, Vec3::ZERO));
+            world.join(Joint::new(5, Vec3::ZERO, ball, -Vec3::X));
+            let mut simulation = simulation(world, JointSolver::Direct);
+            let gap = largest_gap(&mut simulation, 600);
+            assert!(simulation.world.first_non_finite().is_none());
+            gap
+        })
+        .collect();
+    gaps.sort_by(f32::total_cmp);
+    println!("{gaps:?} m");
+    assert!(gaps[4] < 0.02, "{gaps:?} m");
 }
 
 /// One fall tells little: before the law of energy, the links were faster than 5 mm/s after two of these five falls with the direct solution, and

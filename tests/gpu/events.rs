@@ -564,7 +564,7 @@ fn a_sensor_has_no_mass_and_holds_nobody() {
         world.add(Body::fixed().sensor(Shape::half_space(Vec3::Y)));
         world
     });
-    assert!(refused.is_err_and(|e| e.to_string().contains("no sensors")));
+    assert!(refused.is_err_and(|e| e.to_string().contains("cannot be sensors")));
 }
 
 fn the_contacts_of_a_body_are_those_of_all_that_name_it() {
