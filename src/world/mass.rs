@@ -13,6 +13,7 @@ use super::limits::{is_place, is_rotation};
 use super::shape::pose;
 use crate::error::{Result, ensure};
 use crate::math::rotation::product;
+use crate::stats::largest;
 
 /// Mass, center of mass and inertia of a body, in the body's frame. All are zero for a body of infinite mass.
 ///
@@ -133,10 +134,10 @@ impl MassProperties {
     /// Mass properties of some colliders with volume. Parry stores inverses. They are computed at density 1 and scaled
     /// here, so that the mass of a box of 1 m³ equals its density to the last bit.
     ///
-    /// Where the tensor is diagonal, the principal axes are the axes of the body, in any order of the moments. A plane
-    /// mechanism of such bodies stays in its plane to the last bit. Parry sorts the moments and rotates the frame. That
-    /// needs a sine, which platforms compute differently, and its axes are wrong where the smallest moment is a double
-    /// one or where moments are below 1e-5 kg m².
+    /// Parry's principal axes are used only if the principal axes of the solids are parallel to the axes of the body:
+    /// other directions need a sine, and platforms compute it differently. Parry also finds wrong axes in two cases: if
+    /// the two smaller moments are equal and their plane is not that of x, or if moments are below 1e-5 kg m².
+    /// Therefore its tensor is compared with the sum of the tensors of the solids.
     pub(super) fn of_solids(solids: &[&Collider], density: f32) -> Self {
         let solids: Vec<_> = solids.iter().map(|c| (Solid::of(c), pose(c.position, c.rotation))).collect();
         let all: ParryMass = solids.iter().map(|(solid, at)| solid.mass.transform_by(at)).sum();
@@ -146,8 +147,17 @@ impl MassProperties {
             let out = (all.local_com - center).as_dvec3();
             axes * solid.tensor * axes.transpose() + across(out) * f64::from(solid.mass.mass())
         };
-        let exact = solids.iter().map(own).fold(DMat3::ZERO, |sum, own| sum + own);
-        let (moments, frame) = diagonalized(exact);
+        let (mut exact, mut is_aligned) = (DMat3::ZERO, true);
+        for tensor in solids.iter().map(own) {
+            exact += tensor;
+            is_aligned &= tensor == DMat3::from_diagonal(diagonal(&tensor));
+        }
+        let (mut moments, mut frame) = (all.principal_inertia(), all.principal_inertia_local_frame);
+        let size = |m: DMat3| largest(0.0, m.abs().to_cols_array());
+        let is_right = size(tensor(moments, frame) - exact) <= 1e-4 * size(exact);
+        if !is_aligned || !is_right {
+            (moments, frame) = diagonalized(exact);
+        }
         Self {
             mass: all.mass() * density,
             center: all.local_com,
