@@ -148,7 +148,7 @@ impl CuboidPlace {
     pub fn new(half: Vec3, position: Vec3, rotation: Quat) -> Self {
         // The power of two alone, so that scaled cuboids have scaled distances.
         let size = f32::from_bits(half.min_element().to_bits() & 0x7f80_0000);
-        let least = 2.0_f32.powi(-40) * size;
+        let least = size / (1_u64 << 40) as f32;
         Self { rotation, position, half, least, ..Self::default() }
     }
 
