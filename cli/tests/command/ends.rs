@@ -96,8 +96,10 @@ fn with_inputs() -> Folder {
 fn a_command_ends_when_nobody_reads_what_it_prints() {
     let folder = with_inputs();
     for arguments in PRINTING {
-        let mut child = folder.drystone(arguments).spawn().expect("the command starts");
-        drop(child.stdout.take());
+        // Nobody reads from the start: a fast command would print all before its reader could go.
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let child = folder.drystone(arguments).stdout(writer).spawn().expect("the command starts");
         let (line, code) = last(&child.wait_with_output().expect("it ends"));
         assert_eq!(
             (line.as_str(), code),
