@@ -1,5 +1,6 @@
 //! The comparison of backends finds what a backend does wrong, and where.
 
+use crate::common::state::reference;
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::compare::{BodyDifference, Difference, FirstDifference, Stage, compare, first_difference};
 use drystone::stages::problem::{JointImpulseRow, JointRow};
@@ -46,10 +47,6 @@ impl Backend for Faulty {
         }
         Ok(())
     }
-}
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
 }
 
 /// A small pile: by 40 steps it lies on the floor.

@@ -1,10 +1,11 @@
 //! The same scene gives the same bits, for any number of threads; a settled one computes hardly any contact anew.
 
+use crate::common::state::reference;
 use std::collections::HashMap;
 
 use drystone::config::FrictionAt;
 use drystone::stages::problem::effective::{EffectiveMass, InverseMass};
-use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepStats, World};
+use drystone::{Backend, Cpu, Scene, Simulation, SolverConfig, StepStats, World};
 
 /// FNV-1a over every bit of every pose and velocity.
 fn hash(world: &World) -> u64 {
@@ -13,10 +14,6 @@ fn hash(world: &World) -> u64 {
         b.rotation.to_array().into_iter().chain(vectors.into_iter().flatten())
     });
     numbers.fold(0xcbf2_9ce4_8422_2325, |h, x| (h ^ u64::from(x.to_bits())).wrapping_mul(0x100_0000_01b3))
-}
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
 }
 
 fn cpu() -> Box<dyn Backend> {

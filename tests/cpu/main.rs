@@ -8,6 +8,7 @@ mod common {
     pub mod efforts;
     #[cfg(feature = "serde")]
     pub mod settings;
+    pub mod state;
 
     #[cfg(feature = "gpu")]
     pub use drystone::stages::conform::{passes as kernels, random};

@@ -1,5 +1,6 @@
 //! Recordings of runs with all that a caller did, run again to the same bits.
 
+use crate::common::state::reference;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::{
@@ -9,10 +10,6 @@ use drystone::{
 
 const DT: f32 = 1.0 / 60.0;
 const INTERVALS: RecordingIntervals = RecordingIntervals { hash: 5, state: 20 };
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 fn cube(x: f32, y: f32) -> Body {
     Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(x, y, 0.0)

@@ -1,17 +1,13 @@
 //! Runs that fork, go back, or go through bytes have the bits of one that does none of that.
 
+use crate::common::state::reference;
 use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::{
-    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepStats,
-    World,
+    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Scene, Shape, Simulation, SolverConfig, StepStats, World,
 };
 
 const DT: f32 = 1.0 / 60.0;
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 fn cpu() -> Box<dyn Backend> {
     Box::new(Cpu::new())

@@ -1,21 +1,8 @@
 //! Worlds beside each other: each goes its own way to the last bit, as if it were alone.
 
+use crate::common::state::{all_bits, bits, reference};
 use drystone::config::FrictionAt;
-use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, World};
-
-/// Every bit of every pose and velocity of some bodies.
-fn bits(world: &World, bodies: impl IntoIterator<Item = usize>) -> Vec<[u32; 13]> {
-    let of = |b: &drystone::Body| {
-        let ([px, py, pz], [vx, vy, vz]) = (b.position.to_array(), b.linear_velocity.to_array());
-        let ([wx, wy, wz], [qx, qy, qz, qw]) = (b.angular_velocity.to_array(), b.rotation.to_array());
-        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
-    };
-    bodies.into_iter().map(|i| of(&world.bodies[i])).collect()
-}
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
-}
+use drystone::{Backend, Cpu, Scene, Simulation, SolverConfig, World};
 
 fn cpu() -> Box<dyn Backend> {
     Box::new(Cpu::new())
@@ -47,7 +34,7 @@ fn every_copy_of_a_world_goes_as_it_goes_alone() {
     ] {
         for backend in [reference, cpu] {
             let alone = end(&scene(name, parameters, 1, None), backend, &config, steps);
-            let alone = bits(&alone, 0..alone.bodies.len());
+            let alone = all_bits(&alone);
             let all = end(&scene(name, parameters, 5, None), backend, &config, steps);
             for (k, bodies) in all.worlds().into_iter().enumerate() {
                 assert_eq!(bits(&all, bodies), alone, "{name}: world {k}");
@@ -70,11 +57,10 @@ fn a_world_does_not_see_what_other_worlds_do() {
         })
         .collect();
     let all = end(&scene("pile", &["n=60"], 4, Some("seed")), cpu, &SolverConfig::default().without_sleep(), 90);
-    let whole = |world: &World| bits(world, 0..world.bodies.len());
     for (bodies, alone) in all.worlds().into_iter().zip(&alone) {
-        assert_eq!(bits(&all, bodies), whole(alone));
+        assert_eq!(bits(&all, bodies), all_bits(alone));
     }
-    assert_ne!(whole(&alone[0]), whole(&alone[1]));
+    assert_ne!(all_bits(&alone[0]), all_bits(&alone[1]));
 }
 
 #[test]
@@ -84,7 +70,7 @@ fn the_number_of_threads_changes_no_bit_of_many_worlds() {
         pool.install(|| {
             let world =
                 end(&scene("pile", &["n=30"], 12, Some("seed")), cpu, &SolverConfig::default().without_sleep(), 80);
-            bits(&world, 0..world.bodies.len())
+            all_bits(&world)
         })
     };
     let one = run(1);

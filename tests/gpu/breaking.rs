@@ -1,14 +1,13 @@
 //! Joints that break at a force: the impulse of the whole step over its length, against closed forms.
 
+use crate::common::state::reference;
 use std::f32::consts::FRAC_PI_2;
 
 use crate::common::{Open, gpu};
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::plan::Kernel;
-use drystone::{
-    Axis, Backend, Body, Cpu, Event, Joint, JointHandle, Reference, Shape, Simulation, SolverConfig, World,
-};
+use drystone::{Axis, Backend, Body, Cpu, Event, Joint, JointHandle, Shape, Simulation, SolverConfig, World};
 
 tests! {
     exact_gpu {
@@ -26,10 +25,6 @@ tests! {
 const DT: f32 = 1.0 / 60.0;
 const SUBSTEPS: [u32; 4] = [1, 2, 4, 8];
 const EXACT: [Open; 4] = [reference, cpu, cpu_in_parts, exact];
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 fn cpu() -> Box<dyn Backend> {
     Box::new(Cpu::new())

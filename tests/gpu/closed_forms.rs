@@ -3,12 +3,13 @@
 //! The GPU runs plain WGSL here: its exact mode is held to the reference bit for bit elsewhere. Beside every tolerance
 //! stands the largest error that was measured on any backend, and where it comes from.
 
+use crate::common::state::reference;
 use std::f64::consts::{FRAC_PI_6, PI};
 
 use crate::common::Open;
 use crate::common::measurement::{below, holds, is_near};
 use drystone::metrics::rms_speed;
-use drystone::{Backend, Body, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, Body, Shape, Simulation, SolverConfig, World};
 use glam::{DVec3, Quat, Vec3};
 
 const G: f64 = 9.81;
@@ -32,10 +33,6 @@ tests! {
     no_gpu {
         the_comparisons_refuse_what_is_one_percent_off,
     }
-}
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
 }
 
 fn simulation(world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Simulation {

@@ -1,8 +1,9 @@
 //! Damped bodies against the solution of v' = a - d v.
 
+use crate::common::state::{all_bits, bits, reference};
 use crate::common::{Open, gpu};
 use drystone::glam::Vec3;
-use drystone::{Body, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Joint, Shape, Simulation, SolverConfig, World};
 
 tests! {
     every_backend {
@@ -24,10 +25,6 @@ tests! {
 const DT: f32 = 1.0 / 60.0;
 /// From long substeps to those whose velocities are changes since the step began.
 const SUBSTEPS: [u32; 4] = [1, 4, 8, 64];
-
-fn reference() -> Box<dyn drystone::Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 /// A cube of 6 kg with sides of 1 m: 1 kg m² about every axis.
 fn cube() -> Body {
@@ -109,20 +106,10 @@ fn mixture() -> World {
     world
 }
 
-/// Every bit of every pose and velocity of some bodies.
-fn bits(world: &World, bodies: impl IntoIterator<Item = usize>) -> Vec<[u32; 13]> {
-    let of = |b: &Body| {
-        let ([px, py, pz], [vx, vy, vz]) = (b.position.to_array(), b.linear_velocity.to_array());
-        let ([wx, wy, wz], [qx, qy, qz, qw]) = (b.angular_velocity.to_array(), b.rotation.to_array());
-        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
-    };
-    bodies.into_iter().map(|i| of(&world.bodies[i])).collect()
-}
-
 fn same_as_the_reference(open: Open) {
     for substeps in [4, 8, 32] {
         let [ours, theirs] = [reference, open].map(|open| after(mixture(), substeps, 40, open));
-        assert_eq!(bits(&ours, 0..ours.bodies.len()), bits(&theirs, 0..ours.bodies.len()), "{substeps} substeps");
+        assert_eq!(all_bits(&ours), all_bits(&theirs), "{substeps} substeps");
     }
 }
 

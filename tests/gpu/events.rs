@@ -1,10 +1,11 @@
 //! What a simulation tells of the bodies that meet: contacts that begin and end, hits, and the impulses of whole steps.
 
+use crate::common::state::reference;
 use crate::common::{Open, gpu};
 use drystone::glam::{Quat, Vec3, Vec3Swizzles};
 use drystone::{
-    Backend, Body, BodyHandle, ColliderOf, Cpu, Event, Groups, Hit, Joint, Listen, Reference, Shape, Simulation,
-    SolverConfig, World,
+    Backend, Body, BodyHandle, ColliderOf, Cpu, Event, Groups, Hit, Joint, Listen, Shape, Simulation, SolverConfig,
+    World,
 };
 
 /// The example, whose own check has to hold.
@@ -47,10 +48,6 @@ tests! {
 
 const DT: f32 = 1.0 / 60.0;
 const CONTACTS: Listen = Listen { contacts: true, hits_above: None, impulses: false };
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 fn cpu() -> Box<dyn Backend> {
     Box::new(Cpu::new())

@@ -1,8 +1,9 @@
 //! Forces, torques, impulses and gravity against closed forms.
 
+use crate::common::state::{bits, reference};
 use crate::common::{Open, gpu};
 use drystone::glam::{Quat, Vec3};
-use drystone::{Body, Cpu, Joint, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
 
 tests! {
     every_backend {
@@ -34,10 +35,6 @@ tests! {
 }
 
 const DT: f32 = 1.0 / 60.0;
-
-fn reference() -> Box<dyn drystone::Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 fn weightless() -> World {
     World { gravity: Vec3::ZERO, ..World::new() }
@@ -228,16 +225,6 @@ fn mixture() -> World {
     all.beside(&world(Vec3::new(1.0, -1.62, 0.0), 2.0));
     all.beside(&world(Vec3::Y * -25.0, -9.0));
     all
-}
-
-/// Every bit of every pose and velocity of some bodies.
-fn bits(world: &World, bodies: impl IntoIterator<Item = usize>) -> Vec<[u32; 13]> {
-    let of = |b: &Body| {
-        let ([px, py, pz], [vx, vy, vz]) = (b.position.to_array(), b.linear_velocity.to_array());
-        let ([wx, wy, wz], [qx, qy, qz, qw]) = (b.angular_velocity.to_array(), b.rotation.to_array());
-        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
-    };
-    bodies.into_iter().map(|i| of(&world.bodies[i])).collect()
 }
 
 /// The mixture after 40 steps with hits and pushes, with substeps long and short.

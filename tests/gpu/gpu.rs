@@ -7,6 +7,7 @@ mod settings;
 
 use crate::common::difference::of_velocities;
 use crate::common::gpu;
+use crate::common::state::reference;
 use crate::common::tolerance;
 use drystone::backend::gpu::GpuOptions;
 use drystone::config::Method;
@@ -19,8 +20,7 @@ use drystone::stages::problem::ContactSummary;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
 use drystone::{
-    Backend, Body, Cpu, Error, Event, Gpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan,
-    StepProblem,
+    Backend, Body, Cpu, Error, Event, Gpu, Joint, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
 };
 use settings::set;
 
@@ -57,10 +57,6 @@ tests! {
 
 fn pile() -> Scene {
     Scene::find("pile", &[]).expect("a scene of the catalogue")
-}
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
 }
 
 fn after(backend: &mut dyn Backend, problem: &StepProblem, plan: &StepPlan) -> StepProblem {

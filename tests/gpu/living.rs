@@ -1,5 +1,6 @@
 //! Worlds whose bodies come and go while they move.
 
+use crate::common::state::{all_bits, bits_of};
 use drystone::glam::{Quat, Vec3};
 use drystone::{
     Backend, Body, BodyHandle, BodyKind, Cpu, Groups, Joint, Reference, Shape, Simulation, SolverConfig, World,
@@ -64,12 +65,6 @@ fn simulation(world: &World, config: &SolverConfig, open: Open) -> Simulation {
     Simulation::new(world.clone(), config.clone(), open()).expect("a good world")
 }
 
-fn bits(body: &Body) -> [u32; 13] {
-    let ([px, py, pz], [vx, vy, vz]) = (body.position.to_array(), body.linear_velocity.to_array());
-    let ([wx, wy, wz], [qx, qy, qz, qw]) = (body.angular_velocity.to_array(), body.rotation.to_array());
-    [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
-}
-
 /// What lies on a body falls when the body goes, and what the body does not touch does not see it, to the last bit.
 fn a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else(open: Open) {
     for config in [SolverConfig::default(), SolverConfig::default().without_sleep()] {
@@ -85,7 +80,7 @@ fn a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else(open: Open) {
             run(&mut changed, 1);
             run(&mut unchanged, 1);
             for cube in towers[0].iter().chain(&towers[2]).map(|cube| cube.index()) {
-                assert_eq!(bits(&changed.world.bodies[cube]), bits(&unchanged.world.bodies[cube]), "step {step}");
+                assert_eq!(bits_of(&changed.world.bodies[cube]), bits_of(&unchanged.world.bodies[cube]), "step {step}");
             }
         }
         for (level, cube) in towers[1].iter().skip(1).enumerate() {
@@ -139,7 +134,7 @@ fn a_twin_in_the_place_of_a_body_begins_without_its_impulses(open: Open) {
     assert_eq!(changed.world.insert(twin).index(), top.index());
     run(&mut changed, 1);
     run(&mut unchanged, 1);
-    let [new, old] = [&changed, &unchanged].map(|s| bits(&s.world.bodies[top.index()]));
+    let [new, old] = [&changed, &unchanged].map(|s| bits_of(&s.world.bodies[top.index()]));
     assert_ne!(new, old, "impulses of a contact at rest keep every bit");
     run(&mut changed, 60);
     assert!((changed.world.bodies[top.index()].position.y - 4.5).abs() < 2e-3);
@@ -222,7 +217,7 @@ fn bodies_come_and_go_in_one_of_several_worlds() {
         run(&mut one, 1);
         run(&mut three, 1);
         for i in 0..each {
-            assert_eq!(bits(&three.world.bodies[each + i]), bits(&one.world.bodies[i]));
+            assert_eq!(bits_of(&three.world.bodies[each + i]), bits_of(&one.world.bodies[i]));
         }
     }
     let heights: Vec<f32> = new.iter().map(|body| three.world.body(*body).expect("a cube").position.y).collect();
@@ -345,10 +340,10 @@ fn what_comes_and_goes_has_the_same_bits_everywhere() {
                 }
                 _ => world.body_mut(chosen).expect("a cube").groups = Groups { membership: 2, filter: 3 },
             }
-            states.push(simulation.world.bodies.iter().map(bits).collect::<Vec<_>>());
+            states.push(all_bits(&simulation.world));
         }
         run(&mut simulation, 5);
-        states.push(simulation.world.bodies.iter().map(bits).collect());
+        states.push(all_bits(&simulation.world));
         states
     };
     let expected = end(opens[0]);
@@ -395,7 +390,7 @@ fn a_fixed_body_with_a_velocity_is_as_one_without(open: Open) {
     for step in 0..90 {
         run(&mut still, 1);
         run(&mut moving, 1);
-        let body = |s: &Simulation| bits(s.world.body(passing).expect("a cube"));
+        let body = |s: &Simulation| bits_of(s.world.body(passing).expect("a cube"));
         assert_eq!(body(&still), body(&moving), "step {step}");
         assert_eq!(still.manifolds().count(), moving.manifolds().count(), "step {step}");
     }

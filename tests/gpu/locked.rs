@@ -1,8 +1,9 @@
 //! Bodies that turn about some axes of the world only.
 
+use crate::common::state::reference;
 use crate::common::{Open, gpu};
 use drystone::glam::{DVec3, Mat3, Quat, Vec3};
-use drystone::{Body, Cpu, Joint, MassProperties, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
 
 tests! {
     every_backend {
@@ -23,10 +24,6 @@ tests! {
 }
 
 const DT: f32 = 1.0 / 60.0;
-
-fn reference() -> Box<dyn drystone::Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 /// A cube of 6 kg with sides of 1 m: 1 kg m² about every axis.
 fn cube() -> Body {

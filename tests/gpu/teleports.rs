@@ -1,8 +1,9 @@
 //! Bodies that the caller puts elsewhere leave no impulses behind and bring none along.
 
 use crate::common::gpu;
+use crate::common::state::{all_bits, reference};
 use drystone::glam::{Quat, Vec3};
-use drystone::{Body, Cpu, Reference, Shape, Simulation, SolvedManifold, SolverConfig, World};
+use drystone::{Body, Cpu, Shape, Simulation, SolvedManifold, SolverConfig, World};
 
 tests! {
     exact_gpu {
@@ -24,10 +25,6 @@ tests! {
 }
 
 const DT: f32 = 1.0 / 60.0;
-
-fn reference() -> Box<dyn drystone::Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 /// Towers of cubes of 1 m on one floor, 5 m apart: body 1 is the lowest of the first.
 fn towers(heights: &[usize]) -> World {
@@ -213,17 +210,7 @@ fn a_box_that_is_put_away_and_back_within_a_step_keeps_its_bits() {
     both[1].world.bodies[1].position = Vec3::ONE * 50.0;
     both[1].world.bodies[1].position = place;
     both.iter_mut().for_each(|simulation| run(simulation, 10));
-    assert_eq!(bits(&both[0].world), bits(&both[1].world));
-}
-
-/// Every bit of every pose and velocity.
-fn bits(world: &World) -> Vec<[u32; 13]> {
-    let of = |b: &Body| {
-        let ([px, py, pz], [vx, vy, vz]) = (b.position.to_array(), b.linear_velocity.to_array());
-        let ([wx, wy, wz], [qx, qy, qz, qw]) = (b.angular_velocity.to_array(), b.rotation.to_array());
-        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
-    };
-    world.bodies.iter().map(of).collect()
+    assert_eq!(all_bits(&both[0].world), all_bits(&both[1].world));
 }
 
 fn same_as_the_reference(backend: fn() -> Box<dyn drystone::Backend>) {
@@ -242,7 +229,7 @@ fn same_as_the_reference(backend: fn() -> Box<dyn drystone::Backend>) {
         }
         simulation.world
     });
-    assert_eq!(bits(&ours), bits(&theirs));
+    assert_eq!(all_bits(&ours), all_bits(&theirs));
 }
 
 fn a_gpu_has_the_bits_of_the_reference_where_bodies_are_put_elsewhere() {

@@ -5,14 +5,11 @@ mod joints;
 mod plan;
 mod settings;
 
+use crate::common::state::reference;
 use drystone::glam::{Quat, Vec3};
-use drystone::{Backend, Body, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, Body, BodyKind, Cpu, Joint, Shape, Simulation, SolverConfig, World};
 
 const DT: f32 = 1.0 / 60.0;
-
-fn reference() -> Box<dyn Backend> {
-    Box::new(Reference::<f32>::new())
-}
 
 fn cpu() -> Box<dyn Backend> {
     Box::new(Cpu::new())

@@ -1,0 +1,26 @@
+//! The scalar backend, and the state of bodies as bits. Each set of tests uses a part of it.
+#![allow(dead_code)]
+
+use drystone::{Backend, Body, Reference, World};
+
+/// Opens the scalar backend.
+pub fn reference() -> Box<dyn Backend> {
+    Box::new(Reference::<f32>::new())
+}
+
+/// Every bit of the pose and the velocity of a body.
+pub fn bits_of(body: &Body) -> [u32; 13] {
+    let ([px, py, pz], [vx, vy, vz]) = (body.position.to_array(), body.linear_velocity.to_array());
+    let ([wx, wy, wz], [qx, qy, qz, qw]) = (body.angular_velocity.to_array(), body.rotation.to_array());
+    [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
+}
+
+/// The same of some bodies of a world.
+pub fn bits(world: &World, bodies: impl IntoIterator<Item = usize>) -> Vec<[u32; 13]> {
+    bodies.into_iter().map(|i| bits_of(&world.bodies[i])).collect()
+}
+
+/// The same of all bodies of a world.
+pub fn all_bits(world: &World) -> Vec<[u32; 13]> {
+    bits(world, 0..world.bodies.len())
+}
