@@ -268,6 +268,16 @@ impl<S: Scalar> Vec3<S> {
     }
 }
 
+/// `if_true` in lanes where the mask is true; WGSL's `select` of vectors.
+#[inline(always)]
+pub fn select3<L: Lane>(if_false: Vec3<L>, if_true: Vec3<L>, mask: L::Mask) -> Vec3<L> {
+    vec3(
+        L::select(if_false.x, if_true.x, mask),
+        L::select(if_false.y, if_true.y, mask),
+        L::select(if_false.z, if_true.z, mask),
+    )
+}
+
 /// Inner product, summed left to right.
 #[inline(always)]
 pub fn dot3<L: Lane>(a: Vec3<L>, b: Vec3<L>) -> L {

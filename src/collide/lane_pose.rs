@@ -85,15 +85,6 @@ pub(super) fn magnitude<L: Lanes>(x: L) -> L {
     x.with_sign(L::constant(1.0))
 }
 
-#[inline(always)]
-pub(super) fn choose<L: Lanes>(if_false: Vec3<L>, if_true: Vec3<L>, mask: L::Mask) -> Vec3<L> {
-    vec3(
-        L::select(if_false.x, if_true.x, mask),
-        L::select(if_false.y, if_true.y, mask),
-        L::select(if_false.z, if_true.z, mask),
-    )
-}
-
 /// The corner of a cuboid that is furthest in a direction.
 #[inline(always)]
 pub(super) fn corner<L: Lanes>(half: Vec3<L>, direction: Vec3<L>) -> Vec3<L> {

@@ -5,10 +5,10 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use super::collider::{BodyState, Margins, POSE, VELOCITY};
-use super::lane_pose::{Pose, Turn, backwards, choose, length, negative, product};
+use super::lane_pose::{Pose, Turn, backwards, length, negative, product};
 use super::pairs::Track;
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
-use crate::math::{Quat, dot3, vec3};
+use crate::math::{Quat, dot3, select3, vec3};
 
 /// Squared sine of half the largest rotation of either body of a reused manifold: 0.03 rad. Normals stay as computed,
 /// so bodies that turn together can see gravity at an angle up to this. At 0.01 rad, an arch that opens a little is
@@ -126,7 +126,7 @@ impl ReuseTest<'_> {
 fn turn_since<L: Lanes>(now: Quat<L>, then: Quat<L>) -> Quat<L> {
     let turn = product(now, backwards(then));
     let is_long = L::constant(0.0).gt(turn.w);
-    Quat { axis: choose(turn.axis, negative(turn.axis), is_long), w: L::select(turn.w, -turn.w, is_long) }
+    Quat { axis: select3(turn.axis, negative(turn.axis), is_long), w: L::select(turn.w, -turn.w, is_long) }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 
 use super::rows::{Body, Damping, Free, Inertia, Mass, StepParams};
 use crate::math::{
-    Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, turned, vec3,
+    Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, select3, turned, vec3,
 };
 
 /// Adds gravity and force; with `warm_start` also the impulses that the substep before ended with.
@@ -64,17 +64,11 @@ pub fn damp_velocities<L: Lane>(from_start: bool, damping: &Damping<L>, body: &m
     let is_slowed = damping.linear_loss.gt(L::constant(0.0));
     let is_braked = damping.angular_loss.gt(L::constant(0.0));
     if !from_start {
-        free.v = chosen(free.v, free.v + change_v, is_slowed);
-        free.w = chosen(free.w, free.w + change_w, is_braked);
+        free.v = select3(free.v, free.v + change_v, is_slowed);
+        free.w = select3(free.w, free.w + change_w, is_braked);
     }
-    body.v = chosen(body.v, body.v + change_v, is_slowed);
-    body.w = chosen(body.w, body.w + change_w, is_braked);
-}
-
-/// The second vector where the mask holds, else the first.
-#[inline(always)]
-fn chosen<L: Lane>(u: Vec3<L>, v: Vec3<L>, mask: L::Mask) -> Vec3<L> {
-    vec3(L::select(u.x, v.x, mask), L::select(u.y, v.y, mask), L::select(u.z, v.z, mask))
+    body.v = select3(body.v, body.v + change_v, is_slowed);
+    body.w = select3(body.w, body.w + change_w, is_braked);
 }
 
 /// Moves a body by its velocity.
@@ -107,7 +101,7 @@ pub fn end_changes<L: Lane>(body: &mut Body<L>, free: &Free<L>) {
 pub fn start_of<L: Lane>(mass: &Mass<L>, free: &Free<L>) -> Free<L> {
     let is_movable = mass.inv_mass.gt(L::constant(0.0));
     let zero = vec3(L::constant(0.0), L::constant(0.0), L::constant(0.0));
-    Free { v: chosen(zero, free.v, is_movable), w: chosen(zero, free.w, is_movable) }
+    Free { v: select3(zero, free.v, is_movable), w: select3(zero, free.w, is_movable) }
 }
 
 /// Solves rows x = g by Cramer's rule.

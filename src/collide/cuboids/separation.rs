@@ -4,10 +4,10 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use super::super::collider::{BodyState, CuboidPlace, POSE, POSITION};
-use super::super::lane_pose::{Pose, Turn, backwards, choose, corner, length, negative};
+use super::super::lane_pose::{Pose, Turn, backwards, corner, length, negative};
 use super::{CuboidPair, Near};
 use crate::lanes::{Lanes, WIDTH, Wide, Work, columns};
-use crate::math::{Quat, Vec3, dot3, vec3};
+use crate::math::{Quat, Vec3, dot3, select3, vec3};
 
 /// The stage for all pairs. It adds near pairs to `near`.
 pub(super) struct Separation<'a> {
@@ -78,7 +78,7 @@ fn separation<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>, least: 
     // Pick the best direction, and the first one in parry's order if two are equal.
     let is_third = distance_3.gt(distance_1);
     let is_second = L::and(distance_2.gt(distance_1), distance_2.gt(distance_3));
-    let direction = choose(choose(direction_1, direction_3, is_third), from_2, is_second);
+    let direction = select3(select3(direction_1, direction_3, is_third), from_2, is_second);
     (L::larger(L::larger(distance_1, distance_2), distance_3), direction)
 }
 
@@ -100,7 +100,7 @@ fn across_faces<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>, least
         let nearest = turn.of_vector(corner(half_2, back.of_vector(negative(axis)))) + pose.at;
         let distance = [nearest.x, nearest.y, nearest.z][i] * sign - half[i];
         let is_better = distance.gt(best.0);
-        best = (L::select(best.0, distance, is_better), choose(best.1, axis, is_better));
+        best = (L::select(best.0, distance, is_better), select3(best.1, axis, is_better));
         let is_inside = zero.gt(distance);
         sum[i] = L::select(sign * L::larger(distance, least), zero, is_inside);
         beyond = beyond + L::select(one, zero, is_inside);
@@ -110,7 +110,7 @@ fn across_faces<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>, least
     let toward = negative(between);
     let gap = turn.of_vector(corner(half_2, back.of_vector(toward))) + pose.at - corner(half_1, between);
     let is_between = beyond.gt(one);
-    (L::select(best.0, dot3(gap, between), is_between), choose(best.1, between, is_between))
+    (L::select(best.0, dot3(gap, between), is_between), select3(best.1, between, is_between))
 }
 
 /// The distance across the best pair of edges.
@@ -135,7 +135,7 @@ fn across_edges<L: Lanes>(half_1: Vec3<L>, half_2: Vec3<L>, pose: Pose<L>) -> (L
             let nearest = turn.of_vector(corner(half_2, back.of_vector(negative(axis)))) + pose.at;
             let distance = dot3(nearest - corner(half_1, axis), axis);
             let is_better = L::and(norm.gt(L::constant(f64::from(f32::EPSILON))), distance.gt(best.0));
-            best = (L::select(best.0, distance, is_better), choose(best.1, axis, is_better));
+            best = (L::select(best.0, distance, is_better), select3(best.1, axis, is_better));
         }
     }
     best
