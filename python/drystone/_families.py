@@ -24,7 +24,7 @@ Settings = Mapping[str, Any]
 PRESETS: tuple[Settings, ...] = ({"preset": "fast"}, {"preset": "balanced"}, {"preset": "accurate"})
 # Up to here a double has all whole numbers.
 LAST_SEED = 2**53
-# What a clock gave: two runs of one world differ in it.
+# A clock gives these columns, so two runs of one world differ in them.
 TIMED = ("seconds",)
 
 # Lower ends of the cells of a map.
@@ -68,7 +68,7 @@ def families(
     (docs/settings.md). `family`: one name or several; None for all. `seeds`: so many from 1 on, or the seeds themselves. `out` and all that
     follows: as `drystone.survey`; the rows are the same whatever the engine, but for `seconds`, which a clock gives.
 
-    ValueError: a family, a setting or a seed that is none. RuntimeError: a run ended its worker three times.
+    ValueError: an unknown family or setting, or a bad seed. RuntimeError: a run ended its worker three times.
 
     >>> import drystone as ds
     >>> found = ds.survey.families({"preset": ["fast"], "substeps": [1, 8]}, family="slopes", seeds=3, engine="here")

@@ -523,7 +523,7 @@ def cart_on_drawbridge(
     def act(batch: Batch, actions: NDArray[Any]) -> None:
         wanted = np.clip(actions, -1, 1)
         batch.ctrl[:, 0] = WINCH[0] * wanted[:, 0]
-        # What rolls ahead turns against the axis of its hinge.
+        # A wheel that rolls ahead turns against the axis of its hinge.
         batch.ctrl[:, 1:] = -DRIVE[0] * wanted[:, 1:]
 
     def start(rng: np.random.Generator, batch: Batch, world: int) -> None:

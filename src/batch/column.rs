@@ -222,7 +222,7 @@ impl Member {
         for (i, &scale) in scales.iter().enumerate().take(bodies.len()) {
             let first = start.world().bodies.get(i).filter(|first| first.mass.mass > 0.0);
             let Some(first) = first.filter(|_| !bodies.is_vacant(i)) else { continue };
-            // What does not change keeps its bits.
+            // A mass that does not change keeps its bits.
             if scale == scale_of(&bodies[i], Some(first)) {
                 continue;
             }

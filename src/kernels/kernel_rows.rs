@@ -15,7 +15,7 @@ pub struct KernelRows<S> {
     pub masses: Vec<Mass<S>>,
     /// Their angular accelerations by torques, if any has one.
     pub torques: Vec<Vec3<S>>,
-    /// What damping does to them, if any is damped.
+    /// Effects of damping on the bodies; empty if none is damped.
     pub dampings: Vec<Damping<S>>,
     /// Principal inertia of those whose moments differ.
     pub inertias: Vec<Inertia<S>>,

@@ -33,11 +33,11 @@ pub struct Free<L> {
 /// Double of the WGSL struct `Damping`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Damping<L> {
-    /// What the velocity gains besides the plain acceleration.
+    /// Velocity added to the plain acceleration.
     pub linear_gain: Vec3<L>,
     /// The share of the velocity that is lost.
     pub linear_loss: L,
-    /// What the angular velocity gains.
+    /// Angular velocity added likewise.
     pub angular_gain: Vec3<L>,
     /// The share of the angular velocity that is lost.
     pub angular_loss: L,

@@ -103,7 +103,7 @@ pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
         }
         body.forget_applied_forces();
         let center = body.center_of_mass() + Vec3::from_array(row.dp);
-        if !body.has_locked_rotation() || body.locked_rotations != [true; 3] {
+        if !body.has_fixed_rotation() {
             body.rotation = unit(product(Quat::from_array(row.dq), body.rotation));
         }
         body.position = center - body.rotation * body.mass.center;

@@ -13,7 +13,7 @@ use super::StepProblem;
 use super::rows::DampingRow;
 use crate::world::World;
 
-/// What a time changes of a velocity that decays at some rate.
+/// The effect of a time on a velocity that decays at some rate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decay {
     /// The share that is lost: 1 - exp(-x).

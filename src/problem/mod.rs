@@ -77,7 +77,7 @@ pub struct StepProblem {
     pub masses: Vec<MassRow>,
     /// Angular accelerations by torques, one row a body; empty where no body has a torque.
     pub torques: Vec<TorqueRow>,
-    /// What damping does, one row a body; empty where no body is damped.
+    /// Effects of damping, one row for each body; empty if no body is damped.
     pub dampings: Vec<DampingRow>,
     /// Principal inertia of the bodies whose moments differ; empty where the scene has none.
     pub inertias: Vec<InertiaRow>,

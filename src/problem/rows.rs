@@ -84,15 +84,17 @@ impl TorqueRow {
     pub const NONE: Self = Self { angular_acceleration: [-0.0; 3], pad: 0.0 };
 }
 
-/// What the damping of one body does in a substep, besides the plain acceleration: a velocity v changes by the gain less the loss times v, 32 B.
+/// Effect of damping on one body in a substep: a velocity v changes by the gain minus the loss times v, in addition to the
+/// plain acceleration, 32 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DampingRow {
-    /// What gravity and force give besides, as the velocity that they gave does not decay for the whole substep (m/s).
+    /// Velocity that gravity and force add to the plain acceleration, because it does not decay for the whole substep
+    /// (m/s).
     pub linear_gain: [f32; 3],
     /// The share of the velocity that is lost, 0 to 1; 0 of a body without linear damping.
     pub linear_loss: f32,
-    /// What the torque gives besides (rad/s).
+    /// Angular velocity that the torque adds likewise (rad/s).
     pub angular_gain: [f32; 3],
     /// The share of the angular velocity that is lost, 0 to 1.
     pub angular_loss: f32,

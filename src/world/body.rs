@@ -447,8 +447,9 @@ impl Body {
         self.weighing(Weight::Total(mass))
     }
 
-    /// Mass that is added to that of the shapes, with its center and inertia in the body's frame; [`MassProperties::point`] is a point mass. A second
-    /// call takes the place of the first. It adds nothing where [`Self::mass_properties`] gives the mass of the whole body.
+    /// Adds a mass to the mass of the shapes. Its center and inertia are in the body's frame; [`MassProperties::point`]
+    /// is a point mass. A second call replaces the first. The call has no effect if [`Self::mass_properties`] sets the
+    /// mass of the whole body.
     ///
     /// ```
     /// use drystone::{Body, MassProperties, Shape, glam::Vec3};
@@ -698,6 +699,11 @@ impl Body {
         self.kind == BodyKind::Dynamic && self.locked_rotations != [false; 3]
     }
 
+    /// Whether rotation about every axis is locked.
+    pub(crate) fn has_fixed_rotation(&self) -> bool {
+        self.kind == BodyKind::Dynamic && self.locked_rotations == [true; 3]
+    }
+
     /// The part of an angular velocity about the axes that are not locked.
     pub(crate) fn allowed_spin(&self, spin: Vec3) -> Vec3 {
         if !self.has_locked_rotation() {
@@ -719,7 +725,7 @@ impl Body {
             return self.mass.world_inverse_inertia(self.rotation);
         }
         let size = f64::from(self.mass.principal_inertia.max_element());
-        if self.locked_rotations == [true; 3] || size <= 0.0 {
+        if self.has_fixed_rotation() || size <= 0.0 {
             return Mat3::ZERO;
         }
         // By their size, so that no product leaves the range of numbers. A locked axis is put apart from the others.

@@ -88,9 +88,7 @@ impl MassProperties {
             tensor(one.principal_inertia, one.principal_frame) + across(out) * f64::from(one.mass)
         };
         let sum = about(self) + about(other);
-        let along_axes = DMat3::from_diagonal(diagonal(&sum));
-        let (principal_inertia, principal_frame) =
-            if sum == along_axes { (diagonal(&sum).as_vec3(), Quat::IDENTITY) } else { diagonalized(sum) };
+        let (principal_inertia, principal_frame) = diagonalized(sum);
         Self { mass: mass as f32, center: center.as_vec3(), principal_inertia, principal_frame }
     }
 

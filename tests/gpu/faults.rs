@@ -151,7 +151,7 @@ fn no_submission_of_a_plan_of_thousands_of_passes_takes_half_of_it() {
     let best = steps.iter().min_by(|a, b| share(a).total_cmp(&share(b))).expect("some steps");
     measured!("{:?} of {:?}, {} submissions", share(best), best.times.run, best.traffic.submissions);
     assert!(share(best) < 0.5, "{:?} in {:?}", best.traffic, best.times.run);
-    // What the device took for the whole step may have been more than it takes now.
+    // The whole step may have taken longer than a step takes now.
     assert!(
         best.times.run < 8 * best.traffic.submissions as u32 * asked,
         "{:?} in {:?}, asked {asked:?}",
