@@ -48,7 +48,7 @@ pub struct JointNeed {
     pub turns: f32,
 }
 
-/// The class of effort of each island, and which islands are heaps.
+/// The class of effort of each island.
 #[derive(Debug, Default)]
 pub struct Effort {
     /// Body by body.
@@ -59,17 +59,8 @@ pub struct Effort {
     restless: Vec<u32>,
     /// The need that gives them [`RESTLESS_SUBSTEPS`].
     restless_need: f32,
-    /// Whether the body is part of a heap, and whether it was so in the step before; body by body.
-    heaps: Vec<bool>,
-    heaps_before: Vec<bool>,
-    /// Whether any two of these differ.
-    heaps_change: bool,
-    /// Whether heaps have springs of their own.
-    has_heaps: bool,
-    /// Steps until islands are gone over again to look for heaps.
-    heaps_in: u32,
-    /// The kinds of bodies that are awake, ascending; a block each.
-    used: Vec<Kind>,
+    /// The classes of bodies that are awake, ascending; a block each.
+    used: Vec<u8>,
     /// Whether any body, awake or not, is above class 0.
     any_above: bool,
     /// Whether classes rose since they were decided.
@@ -93,11 +84,6 @@ crate::saved::cloned!(Effort {
     calm_for,
     restless,
     restless_need,
-    heaps,
-    heaps_before,
-    heaps_change,
-    has_heaps,
-    heaps_in,
     used,
     any_above,
     is_refined,
@@ -118,11 +104,6 @@ impl Saved for Effort {
             calm_for,
             restless,
             restless_need,
-            heaps,
-            heaps_before,
-            heaps_change,
-            has_heaps,
-            heaps_in,
             used,
             any_above,
             is_refined,
@@ -138,21 +119,14 @@ impl Saved for Effort {
         if A::READS {
             classes.resize(bodies, 0);
             calm_for.resize(bodies, 0);
-            heaps.resize(bodies, false);
-            heaps_before.resize(bodies, false);
         }
         archive.runs(bodies, |i, archive| {
             classes[i].walk(archive)?;
             calm_for[i].walk(archive)?;
-            heaps[i].walk(archive)?;
-            heaps_before[i].walk(archive)?;
             ensure(classes[i] <= HIGHEST, || format!("body {i} has class {}", classes[i]))
         })?;
         restless.walk(archive)?;
         restless_need.walk(archive)?;
-        heaps_change.walk(archive)?;
-        has_heaps.walk(archive)?;
-        heaps_in.walk(archive)?;
         used.walk(archive)?;
         any_above.walk(archive)?;
         is_refined.walk(archive)?;
@@ -163,11 +137,6 @@ impl Saved for Effort {
     }
 }
 
-/// What bodies of one block have in common: their class, and whether they are of heaps.
-type Kind = (u8, bool);
-
-/// Islands are looked for heaps in every so many steps.
-const HEAPS_EVERY: u32 = 8;
 /// Fewest substeps of an island in which a body began unbalanced, until it rests or falls. Of arches of 13 to 41 wedges,
 /// 0.12 of the radius thick, 4 of 15 stand with 8, 9 with 16 and 10 with 32.
 const RESTLESS_SUBSTEPS: f32 = 32.0;
@@ -217,34 +186,19 @@ impl Effort {
         self.highest = Self::highest(config);
         self.long_from = (LONG_SUBSTEPS / config.substeps).checked_ilog2().unwrap_or(0) as u8;
         self.restless_need = (RESTLESS_SUBSTEPS / config.substeps as f32).powi(2);
-        self.has_heaps = config.has_heap_springs();
-        if self.heaps_change {
-            self.heaps_before.clone_from(&self.heaps);
-            self.heaps_change = false;
-        }
         let is_first = self.classes.is_empty();
         if is_first {
             self.classes.resize(world.bodies.len(), 0);
             self.calm_for.resize(world.bodies.len(), 0);
-            self.heaps.resize(world.bodies.len(), false);
-            self.heaps_before.resize(world.bodies.len(), false);
             self.movable = world.dynamic_count() as u32;
-            // Springs of heaps push out what begins inside of each other faster than the detection looks ahead.
-            self.heaps_in = HEAPS_EVERY;
             if self.highest > 0 {
                 self.begin(world, config, dt);
             }
         }
-        self.heaps_in = self.heaps_in.saturating_sub(1);
-        let looks = self.heaps_in == 0 && (self.has_heaps || self.any_heap());
-        if looks {
-            self.heaps_in = HEAPS_EVERY;
-        }
-        // No contact holds bodies of two kinds.
-        let has_kinds = self.used.len() > 1;
+        // No contact holds bodies of two classes.
         let is_restless = !self.restless.is_empty();
-        let changed = (is_first || self.any_above || is_above || looks || has_kinds || is_restless)
-            && self.follow_islands(world, asleep, interfaces(), dt, looks);
+        let changed = (is_first || self.any_above || is_above || is_restless)
+            && self.follow_islands(world, asleep, interfaces(), dt);
         if is_restless {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
             self.restless.retain(|&body| {
@@ -264,11 +218,8 @@ impl Effort {
         self.restless.retain(|&body| changed.binary_search(&(body as usize)).is_err());
         self.classes.resize(bodies, 0);
         self.calm_for.resize(bodies, 0);
-        self.heaps.resize(bodies, false);
-        self.heaps_before.resize(bodies, false);
         for &i in changed.iter().filter(|&&i| i < bodies) {
             (self.classes[i], self.calm_for[i]) = (0, 0);
-            (self.heaps[i], self.heaps_before[i]) = (false, false);
         }
         self.movable = world.dynamic_count() as u32;
     }
@@ -291,10 +242,6 @@ impl Effort {
         true
     }
 
-    fn any_heap(&self) -> bool {
-        self.heaps.contains(&true)
-    }
-
     /// Classes by the loads of statics.
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
         // Boxes of bodies beside each other may overlap.
@@ -309,7 +256,7 @@ impl Effort {
             Interface { a, b, need: need as f32, force: 0.0, joint: None }
         };
         let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
-        self.follow_islands(world, &[], interfaces.iter().copied(), dt, false);
+        self.follow_islands(world, &[], interfaces.iter().copied(), dt);
     }
 
     fn follow_islands(
@@ -318,7 +265,6 @@ impl Effort {
         asleep: &[bool],
         interfaces: impl Iterator<Item = Interface> + Clone,
         dt: f32,
-        looks_for_heaps: bool,
     ) -> bool {
         let bodies = world.bodies.len();
         self.islands.reset(bodies);
@@ -343,7 +289,6 @@ impl Effort {
             island.bodies += 1;
             island.class = island.class.max(self.classes[i]);
             island.calm_for = island.calm_for.min(self.calm_for[i]);
-            island.is_heap |= self.heaps[i];
             island.fastest = island.fastest.max(body.linear_velocity.length());
             if is_dynamic {
                 island.load += load_of(body, world.gravity_on(i), dt);
@@ -355,7 +300,6 @@ impl Effort {
                 let island = &mut self.of_root[root(body)];
                 island.load += drives;
                 island.whole_need = island.whole_need.max(turns);
-                island.has_joints = true;
             }
         }
         for Interface { a, b, need, force, joint } in interfaces {
@@ -365,7 +309,7 @@ impl Effort {
             if joint.is_some() {
                 island.whole_need = island.whole_need.max(need);
             } else {
-                island.needs.add(need);
+                island.largest_need = island.largest_need.max(need);
                 island.contacts += 1;
             }
         }
@@ -374,28 +318,21 @@ impl Effort {
             *need = need.max(self.restless_need);
         }
         for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
-            if looks_for_heaps {
-                island.is_heap = self.has_heaps && island.becomes_heap();
-            }
             (island.class, island.calm_for) = island.next(self.highest, self.long_from);
         }
         let mut changed = std::mem::take(&mut self.is_refined);
-        let mut kinds = [[0; 2]; EFFORT_CLASSES];
+        self.counts = [0; EFFORT_CLASSES];
         for &(body, is_dynamic) in &self.awake {
-            let Island { class, calm_for, is_heap, .. } = self.of_root[root(body)];
+            let Island { class, calm_for, .. } = self.of_root[root(body)];
             let body = body as usize;
             changed |= class != self.classes[body];
             (self.classes[body], self.calm_for[body]) = (class, calm_for);
-            self.heaps[body] = is_heap;
-            self.heaps_change |= is_heap != self.heaps_before[body];
-            kinds[usize::from(class)][usize::from(is_heap)] += u32::from(is_dynamic);
+            self.counts[usize::from(class)] += u32::from(is_dynamic);
         }
-        self.counts = kinds.map(|kinds| kinds.iter().sum());
         self.used.clear();
-        let all = (0..=HIGHEST).flat_map(|class| [(class, false), (class, true)]);
-        self.used.extend(all.filter(|&(class, is_heap)| kinds[usize::from(class)][usize::from(is_heap)] > 0));
+        self.used.extend((0..=HIGHEST).filter(|&class| self.counts[usize::from(class)] > 0));
         self.any_above = self.classes.iter().any(|&class| class > 0);
-        changed | self.heaps_change
+        changed
     }
 
     /// Bodies that are awake and can be pushed, class by class, where so many sleep.
@@ -423,38 +360,22 @@ impl Effort {
         self.used.len().max(1)
     }
 
-    /// The block of a body: of bodies that are awake one for each kind, in the order of the classes.
+    /// The block of a body: of bodies that are awake one for each class, ascending.
     pub fn block_of(&self, body: usize) -> usize {
         if self.used.len() < 2 {
             return 0;
         }
-        let kind = (self.class_of(body), self.is_in_heap(body));
-        self.used.iter().position(|&used| used == kind).unwrap_or(0)
+        self.used.iter().position(|&used| used == self.class_of(body)).unwrap_or(0)
     }
 
-    /// The class of the bodies of a block, and whether they are of heaps.
-    pub fn kind_of_block(&self, block: usize) -> Kind {
+    /// The class of the bodies of a block.
+    pub fn class_of_block(&self, block: usize) -> u8 {
         self.used.get(block).copied().unwrap_or_default()
     }
 
     /// The class of each body.
     pub fn classes(&self) -> &[u8] {
         &self.classes
-    }
-
-    /// Whether any body became part of a heap in this step, or ceased to be.
-    pub fn heaps_change(&self) -> bool {
-        self.heaps_change
-    }
-
-    /// Whether the body is part of a heap.
-    pub fn is_in_heap(&self, body: usize) -> bool {
-        self.heaps.get(body) == Some(&true)
-    }
-
-    /// Whether the body was part of a heap in the step before.
-    pub fn was_in_heap(&self, body: usize) -> bool {
-        self.heaps_before.get(body) == Some(&true)
     }
 
     /// The length of the substeps of a body over that of class 0.

@@ -2,15 +2,14 @@
 // step before. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold. Doubles: Writer::write_slot in
 // src/problem/write.rs, yielding and preloaded in src/problem/carry.rs.
 
-fn yielding(share: f32, both_movable: bool, in_heap: bool, pressed: f32) -> f32 {
-    let movable = resident.preload.movable_compliance;
-    let compliance = select(select(resident.preload.fixed_compliance, movable, both_movable), 0.5 * movable, in_heap);
+fn yielding(share: f32, both_movable: bool, pressed: f32) -> f32 {
+    let compliance = select(resident.preload.fixed_compliance, resident.preload.movable_compliance, both_movable);
     return pressed * (compliance * share);
 }
 
-fn preloaded(in_heap: bool, before: f32, sag: f32) -> f32 {
+fn preloaded(before: f32, sag: f32) -> f32 {
     // A contact that bears less has less preload at once.
-    return smaller(before + resident.preload.share * (select(sag, 0.0, in_heap) - before), 2.0 * sag);
+    return smaller(before + resident.preload.share * (sag - before), 2.0 * sag);
 }
 
 fn begin_contact(at: u32) {
@@ -20,15 +19,14 @@ fn begin_contact(at: u32) {
     let a = masses[contact.body_a].inv_mass;
     let b = masses[contact.body_b].inv_mass;
     let both_movable = a > 0.0 && b > 0.0;
-    let in_heap = masses[contact.body_a].heap > 0.0 || masses[contact.body_b].heap > 0.0;
     var pressed = 0.0;
     var mass = 0.0;
     for (var k = contact.first_point; k < end; k++) {
         pressed += impulses[k].normal;
         mass += points[k].normal_mass;
     }
-    let yields = yielding(contact.substep_share, both_movable, in_heap, pressed);
-    contacts[i].preload = preloaded(in_heap, contact.preload, yields * reciprocal(mass));
+    let yields = yielding(contact.substep_share, both_movable, pressed);
+    contacts[i].preload = preloaded(contact.preload, yields * reciprocal(mass));
     for (var k = 0u; k < contact.point_count; k++) {
         points[contact.first_point + k].separation = separations[MAX_POINTS * at + k];
     }

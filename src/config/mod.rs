@@ -250,13 +250,6 @@ impl SolverConfig {
         if self.max_penetration > 0.0 { share.min(self.max_penetration) } else { share }
     }
 
-    /// Whether heaps have springs of their own (`Substep::of_heap`). Stiffer ones than those of the default would rattle, and sweeps that
-    /// end by what all bodies do have one block.
-    pub(crate) fn has_heap_springs(&self) -> bool {
-        let is_default_method = self.method == Method::Plain && self.tolerance == 0.0;
-        is_default_method && self.stabilization == Stabilization::Soft && self.contact_frequency <= 0.125
-    }
-
     /// The friction rule that these settings come to.
     pub fn friction_rule(&self) -> FrictionRule {
         match self.friction {

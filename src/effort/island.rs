@@ -1,38 +1,18 @@
-//! One island: its needs, whether it is a heap, and its next class.
+//! One island: its needs and its next class.
 
 use crate::stats::EFFORT_CLASSES;
-
-/// Numbers of the contacts of an island.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Needs {
-    pub largest: f32,
-    /// The sum of their squares.
-    pub squares: f32,
-}
-
-impl Needs {
-    const NONE: Self = Self { largest: 0.0, squares: 0.0 };
-
-    pub fn add(&mut self, need: f32) {
-        self.largest = self.largest.max(need);
-        self.squares += need * need;
-    }
-}
 
 /// What decides the class of an island.
 #[derive(Clone, Copy, Debug)]
 pub struct Island {
-    /// The needs of its contacts.
-    pub needs: Needs,
+    /// The largest need of its contacts.
+    pub largest_need: f32,
     /// What its bodies and the drives of its joints can be as a load (N).
     pub load: f32,
     /// The largest need of its joints, and of restless bodies: no other contact takes load from them.
     pub whole_need: f32,
     pub contacts: u32,
     pub bodies: u32,
-    pub has_joints: bool,
-    /// Whether any of its bodies was part of a heap.
-    pub is_heap: bool,
     /// The speed of its fastest body (m/s).
     pub fastest: f32,
     /// The highest class of its bodies, and the fewest steps for which any was calm.
@@ -43,40 +23,28 @@ pub struct Island {
 impl Island {
     /// An island without bodies.
     pub const NONE: Self = Self {
-        needs: Needs::NONE,
+        largest_need: 0.0,
         load: 0.0,
         whole_need: 0.0,
         contacts: 0,
         bodies: 0,
-        has_joints: false,
-        is_heap: false,
         fastest: 0.0,
         class: 0,
         calm_for: u8::MAX,
     };
 
-    /// The need that counts. A column hands its load on through one contact a body and sways where that contact is soft; with several
-    /// contacts a body, the load of a contact has other ways. A heap stands with any springs, and its root mean square counts.
-    fn counted(&self, needs: Needs) -> f32 {
-        let contacts = self.contacts.max(1) as f32;
-        if self.is_heap {
-            (needs.squares / contacts).sqrt()
-        } else {
-            needs.largest * (self.bodies as f32 / contacts).min(1.0)
-        }
-    }
-
-    /// Whether it is a heap now. Islands with joints are none.
-    pub fn becomes_heap(&self) -> bool {
-        let least = if self.is_heap { HEAP_LEAVES } else { HEAP_BEGINS };
-        !self.has_joints && self.contacts as f32 > least * self.bodies as f32
+    /// The need that counts. A column hands its load on through one contact a body, and sways where that contact is soft. Where a body has several
+    /// contacts, the load has as many ways, and so has what is left of it where one of them gives way.
+    fn counted(&self) -> f32 {
+        let ways = (self.bodies as f32 / self.contacts.max(1) as f32).min(1.0);
+        self.largest_need * ways * ways
     }
 
     /// The next class, and for how many steps the island has been calm. `highest` is the highest class that the settings allow; above class
     /// `long_from` fewer steps suffice.
     pub fn next(&self, highest: u8, long_from: u8) -> (u8, u8) {
         let class = self.class.min(highest);
-        let need = self.counted(self.needs).max(self.whole_need);
+        let need = self.counted().max(self.whole_need);
         let wanted = class_for(need).min(highest);
         if wanted >= class {
             return (wanted, 0);
@@ -91,10 +59,6 @@ impl Island {
     }
 }
 
-/// Contacts a body from which on an island is a heap, and below which it is none again. Pyramids, walls and towers of planks have 1 to 2.0
-/// contacts a body, piles of equal boxes 3.3, piles of mixed boxes 2.5.
-const HEAP_BEGINS: f32 = 2.25;
-const HEAP_LEAVES: f32 = 2.1;
 /// Steps after which an island goes down one class, up to the class from which on fewer suffice; half as many from each class above.
 const CALM_STEPS: u32 = 60;
 /// The share of the promise that the lower class has to keep.
@@ -123,12 +87,8 @@ mod tests {
         }
     }
 
-    fn needs(of_all: f32, contacts: u32) -> Needs {
-        Needs { largest: of_all, squares: contacts as f32 * of_all * of_all }
-    }
-
     fn island(need: f32, class: u8, calm_for: u8) -> Island {
-        Island { needs: needs(need, 2), contacts: 2, bodies: 2, class, calm_for, ..Island::NONE }
+        Island { largest_need: need, contacts: 2, bodies: 2, class, calm_for, ..Island::NONE }
     }
 
     /// The next class and the steps of calm.
@@ -150,21 +110,10 @@ mod tests {
         assert_eq!([43, 44].map(|calm_for| next(island(0.0, 7, calm_for), 7)), [(7, 59), (6, 0)]);
     }
 
-    /// Contacts that come and go change nothing, and joints hold what is no heap.
     #[test]
-    fn many_contacts_a_body_make_a_heap() {
-        let island = |contacts: u32, is_heap: bool| Island { contacts, bodies: 100, is_heap, ..Island::NONE };
-        assert!(!island(225, false).becomes_heap() && island(226, false).becomes_heap());
-        assert!(island(211, true).becomes_heap() && !island(209, true).becomes_heap());
-        assert!(!Island { has_joints: true, ..island(400, true) }.becomes_heap());
-        let squares = 9.0 * 400.0;
-        assert_eq!(island(400, true).counted(Needs { largest: 60.0, squares }), 3.0);
-    }
-
-    #[test]
-    fn a_heap_needs_less_than_a_column() {
-        let counted = |contacts: u32| Island { contacts, ..island(8.0, 0, 0) }.counted(needs(8.0, contacts));
-        assert_eq!([1, 2, 8].map(counted), [8.0, 8.0, 2.0]);
+    fn a_load_with_several_ways_needs_less_than_a_column() {
+        let counted = |contacts: u32| Island { contacts, ..island(8.0, 0, 0) }.counted();
+        assert_eq!([1, 2, 4, 8].map(counted), [8.0, 8.0, 2.0, 0.5]);
         let class = |whole_need: f32| next(Island { whole_need, contacts: 8, ..island(8.0, 0, 0) }, 7).0;
         assert_eq!([2.0, 5.0].map(class), [1, 2]);
     }

@@ -97,10 +97,8 @@ pub fn lay_out(
     let count = effort.block_count();
     blocks.clear();
     blocks.extend((0..count).map(|block| {
-        let (class, is_heap) = effort.kind_of_block(block);
-        let substeps = config.substeps << class;
-        let substep = if is_heap { Substep::of_heap } else { Substep::new };
-        Block { substeps, substep: substep(config, dt / substeps as f32), ..Block::default() }
+        let substeps = config.substeps << effort.class_of_block(block);
+        Block { substeps, substep: Substep::new(config, dt / substeps as f32), ..Block::default() }
     }));
     let block_of = |body: u32| if count == 1 { 0 } else { effort.block_of(body as usize) };
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);

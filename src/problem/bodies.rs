@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use super::StepProblem;
 use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params, TorqueRow};
 use crate::config::{SolverConfig, Stabilization};
-use crate::effort::Effort;
 use crate::math::Lane;
 use crate::math::rotation::{product, unit};
 use crate::world::{Body, BodyKind, World};
@@ -18,8 +17,8 @@ pub(super) const LEAST_BODIES: usize = 256;
 
 /// Begins the problem of a step of `dt` seconds: what is the same for all, and the rows of bodies. Bodies that are `asleep` stand there as
 /// bodies that nothing moves.
-pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, effort: &Effort, problem: &mut StepProblem) {
-    write_bodies(world, asleep, config, effort, problem);
+pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
+    write_bodies(world, asleep, config, problem);
     problem.params = Params {
         restitution_threshold: config.restitution_threshold,
         body_count: problem.bodies.len() as u32,
@@ -32,7 +31,7 @@ pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, effort: &Eff
     problem.momentum = MomentumRow::default();
 }
 
-fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &Effort, problem: &mut StepProblem) {
+fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
     let rests = |i: usize| asleep.get(i) == Some(&true);
     let state = |(i, b): (usize, &Body)| {
         let moves = b.kind != BodyKind::Fixed && !rests(i);
@@ -48,9 +47,8 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, effort: &
         if b.whole_torque() != Vec3::ZERO {
             has_torques.store(true, Ordering::Relaxed);
         }
-        let heap = if effort.is_in_heap(index) { 1.0 } else { 0.0 };
         let acceleration = (world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array();
-        MassRow { heap, acceleration, ..mass_row(b) }
+        MassRow { acceleration, ..mass_row(b) }
     };
     world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);
     problem.torques.clear();

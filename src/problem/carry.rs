@@ -6,7 +6,6 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::softness::HEAP_STIFFNESS;
 use crate::math::{Lane, smaller};
 
 /// The changes since the last step, for a backend that has the rows of that step.
@@ -67,18 +66,10 @@ impl Preload {
     /// contact is one of two bodies that can move, or of one that cannot with one that can; the length of its substeps over that of
     /// class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
     #[inline(always)]
-    pub(crate) fn yielding<L: Lane>(&self, share: L, both_movable: L::Mask, in_heap: L::Mask, pressed: L) -> L {
-        let compliance: L = self.compliance(both_movable, in_heap);
-        // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
-        pressed * (compliance * share)
-    }
-
-    /// Overlap at rest per impulse of a substep, times the effective mass (s).
-    #[inline(always)]
-    pub(super) fn compliance<L: Lane>(&self, both_movable: L::Mask, in_heap: L::Mask) -> L {
+    pub(crate) fn yielding<L: Lane>(&self, share: L, both_movable: L::Mask, pressed: L) -> L {
         let [movable, fixed] = [self.movable_compliance, self.fixed_compliance].map(|c| L::constant(c.into()));
-        let of_heap = L::constant((self.movable_compliance / HEAP_STIFFNESS).into());
-        L::select(L::select(fixed, movable, both_movable), of_heap, in_heap)
+        // The stiffness falls with the square of the length of a substep, and impulses grow with the length.
+        pressed * (L::select(fixed, movable, both_movable) * share)
     }
 }
 
@@ -87,13 +78,10 @@ impl Preload {
 ///
 /// That much its surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they
 /// are for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
-///
-/// In a heap it vanishes: it lifts bodies that friction holds, and heaps that were lifted creep.
 #[inline(always)]
-pub(super) fn preloaded<L: Lane>(by: &Preload, in_heap: L::Mask, before: L, sag: L) -> L {
-    let wanted = L::select(sag, L::constant(0.0), in_heap);
+pub(super) fn preloaded<L: Lane>(by: &Preload, before: L, sag: L) -> L {
     // Where the load ends, the preload ends too.
-    smaller(before + L::constant(by.share.into()) * (wanted - before), L::constant(LARGEST_PRELOAD) * sag)
+    smaller(before + L::constant(by.share.into()) * (sag - before), L::constant(LARGEST_PRELOAD) * sag)
 }
 
 #[cfg(test)]
@@ -104,7 +92,7 @@ mod tests {
 
     /// The overlap of springs side by side.
     fn sag(share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
-        BY.yielding(share, both_movable, false, pressed) / mass
+        BY.yielding(share, both_movable, pressed) / mass
     }
 
     fn near(x: f32, y: f32) {
@@ -114,21 +102,10 @@ mod tests {
     /// An impulse of 8 N s on 2 kg sags by 8 / 2 times the compliance.
     #[test]
     fn a_preload_takes_its_share_of_what_is_missing_to_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, false, 0.0, sag(1.0, true, 8.0, 2.0)), 1.0);
-        near(preloaded(&BY, false, 1.0, sag(1.0, true, 8.0, 2.0)), 1.5);
-        near(preloaded(&BY, false, 0.0, sag(1.0, false, 8.0, 2.0)), 0.5);
-        near(preloaded(&BY, false, 3.0, sag(1.0, true, 8.0, 2.0)), 2.5);
-    }
-
-    /// A heap has springs twice as stiff as those between bodies that can move, and its preload goes.
-    #[test]
-    fn a_contact_of_a_heap_loses_its_preload() {
-        for both_movable in [true, false] {
-            assert_eq!(2.0 * BY.yielding(1.0, both_movable, true, 8.0), BY.yielding(1.0, true, false, 8.0));
-        }
-        near(preloaded(&BY, true, 1.0, 4.0), 0.5);
-        near(preloaded(&BY, true, -1.0, 4.0), -0.5);
-        near(preloaded(&BY, true, 0.0, 4.0), 0.0);
+        near(preloaded(&BY, 0.0, sag(1.0, true, 8.0, 2.0)), 1.0);
+        near(preloaded(&BY, 1.0, sag(1.0, true, 8.0, 2.0)), 1.5);
+        near(preloaded(&BY, 0.0, sag(1.0, false, 8.0, 2.0)), 0.5);
+        near(preloaded(&BY, 3.0, sag(1.0, true, 8.0, 2.0)), 2.5);
     }
 
     #[test]
@@ -138,8 +115,8 @@ mod tests {
 
     #[test]
     fn a_preload_is_at_most_twice_the_overlap_of_what_is_borne() {
-        near(preloaded(&BY, false, 100.0, sag(1.0, true, 8.0, 2.0)), 4.0);
-        near(preloaded(&BY, false, 100.0, sag(1.0, false, 8.0, 2.0)), 2.0);
-        near(preloaded(&BY, false, 100.0, sag(1.0, true, 0.0, 2.0)), 0.0);
+        near(preloaded(&BY, 100.0, sag(1.0, true, 8.0, 2.0)), 4.0);
+        near(preloaded(&BY, 100.0, sag(1.0, false, 8.0, 2.0)), 2.0);
+        near(preloaded(&BY, 100.0, sag(1.0, true, 0.0, 2.0)), 0.0);
     }
 }

@@ -367,7 +367,7 @@ impl ContactRows {
             rotation: body.rotation.to_array(),
         };
         world.bodies.par_iter().with_min_len(LEAST_BODIES).map(pose).collect_into_vec(poses);
-        let effort_changes = effort.heaps_change() || *classes != effort.classes();
+        let effort_changes = *classes != effort.classes();
         if effort_changes {
             classes.clear();
             classes.extend_from_slice(effort.classes());

@@ -155,15 +155,15 @@ impl Over<'_> {
         unsafe { L::gathered(self.rows.computed.as_ptr().cast(), &places) }
     }
 
-    /// Inverse inertia and mass of the bodies a, or b, and whether they are of a heap.
+    /// Inverse inertia and mass of the bodies a, or b.
     #[inline(always)]
-    fn masses<L: Lanes>(&self, bodies: &[u32; WIDTH]) -> (Mass<L>, L) {
+    fn masses<L: Lanes>(&self, bodies: &[u32; WIDTH]) -> Mass<L> {
         let places = places(bodies, units::<MassRow>(), 0);
         // SAFETY: `group` has compared each body with the length.
-        let [xx, xy, xz, inv_mass, yy, yz, zz, heap] =
+        let [xx, xy, xz, inv_mass, yy, yz, zz, _] =
             unsafe { L::gathered(self.rows.masses.as_ptr().cast::<Row8>(), &places) };
         let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
-        (Mass { inv_inertia, inv_mass, acceleration: Default::default() }, heap)
+        Mass { inv_inertia, inv_mass, acceleration: Default::default() }
     }
 
     #[inline(always)]
@@ -178,7 +178,7 @@ impl Over<'_> {
     fn write_masses<L: Lanes>(&self, group: &Group, tangents: bool, jams: bool) {
         let [nx, ny, nz, friction, tx, ty, tz, _] = self.contacts::<L>(group, 0);
         let frame = Frame { normal: vec3(nx, ny, nz), tangent: vec3(tx, ty, tz), friction };
-        let ((a, _), (b, _)) = (self.masses::<L>(&group.bodies[0]), self.masses::<L>(&group.bodies[1]));
+        let (a, b) = (self.masses::<L>(&group.bodies[0]), self.masses::<L>(&group.bodies[1]));
         let mut jammed = [false; WIDTH];
         for k in 0..group.most as usize {
             let [ax, ay, az, _, bx, by, bz, _] = self.points::<L>(group, k);
@@ -239,11 +239,10 @@ impl Over<'_> {
         if !loads {
             return;
         }
-        let ((a, heap_a), (b, heap_b)) = (self.masses::<L>(&group.bodies[0]), self.masses::<L>(&group.bodies[1]));
+        let (a, b) = (self.masses::<L>(&group.bodies[0]), self.masses::<L>(&group.bodies[1]));
         let both_movable = L::and(a.inv_mass.gt(zero), b.inv_mass.gt(zero));
-        let in_heap = (heap_a + heap_b).gt(zero);
-        let yields = self.rows.preload.yielding(share, both_movable, in_heap, pressed);
-        let preload = preloaded(self.rows.preload, in_heap, before, yields * reciprocal(mass)).store();
+        let yields = self.rows.preload.yielding(share, both_movable, pressed);
+        let preload = preloaded(self.rows.preload, before, yields * reciprocal(mass)).store();
         let sag = (yields * (a.inv_mass + b.inv_mass)).store();
         for lane in 0..group.len {
             let slot = group.slots[lane] as usize;
@@ -327,7 +326,6 @@ mod tests {
                 inv_inertia_x: [3.0 + x, 0.3 * y, 0.2 * z].map(|i| movable * i),
                 inv_inertia_yz: [2.0 + y, 0.1 * x, 4.0 + z].map(|i| movable * i),
                 inv_mass: movable * (1.5 + x),
-                heap: if k == 3 { 1.0 } else { 0.0 },
                 ..MassRow::default()
             }
         });
@@ -412,9 +410,8 @@ mod tests {
                 mass += masses.normal;
             }
             let both = a.inv_mass > 0.0 && b.inv_mass > 0.0;
-            let in_heap = bodies.iter().any(|&body| tables.masses[body].heap > 0.0);
-            let yields = PRELOAD.yielding(contact.substep_share, both, in_heap, pressed);
-            contact.preload = preloaded(&PRELOAD, in_heap, contact.preload, yields * reciprocal(mass));
+            let yields = PRELOAD.yielding(contact.substep_share, both, pressed);
+            contact.preload = preloaded(&PRELOAD, contact.preload, yields * reciprocal(mass));
             tables.sags[i] = yields * (a.inv_mass + b.inv_mass);
             tables.impulses[i * STRIDE..(i + 1) * STRIDE].iter_mut().for_each(|impulse| impulse.peak = 0.0);
         }

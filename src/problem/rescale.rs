@@ -3,7 +3,6 @@
 use super::StepProblem;
 use super::carry::LARGEST_PRELOAD;
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
-use super::softness::HEAP_STIFFNESS;
 use crate::config::SolverConfig;
 use crate::world::{BodyKind, World};
 
@@ -27,16 +26,8 @@ impl StepScale {
     }
 
     /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m).
-    pub(super) fn yielding(&self, both_movable: bool, in_heap: bool, pressed: f32) -> f32 {
-        let of_heap = self.movable_compliance / HEAP_STIFFNESS;
-        pressed
-            * if in_heap {
-                of_heap
-            } else if both_movable {
-                self.movable_compliance
-            } else {
-                self.fixed_compliance
-            }
+    pub(super) fn yielding(&self, both_movable: bool, pressed: f32) -> f32 {
+        pressed * if both_movable { self.movable_compliance } else { self.fixed_compliance }
     }
 
     /// That of steps of `dt` seconds.
@@ -66,7 +57,7 @@ pub(super) fn change_share(
 /// the springs that it had.
 ///
 /// An overlap beyond that is no load but a push. A preload that took it up held a body 0.25 m deep in a wall, which was on its way out of it.
-pub(super) fn change_compliance(contact: &mut ContactRow, factor: f32, sag: f32, points: &[PointRow]) {
+fn change_compliance(contact: &mut ContactRow, factor: f32, sag: f32, points: &[PointRow]) {
     let points = &points[..contact.point_count as usize];
     let separation = points.iter().map(|point| point.separation).sum::<f32>() / points.len() as f32;
     let compression = (contact.preload - separation).max(0.0).min(LARGEST_PRELOAD as f32 * sag);

@@ -61,8 +61,8 @@ pub struct MassRow {
     pub inv_mass: f32,
     /// Inverse inertia; yy yz zz.
     pub inv_inertia_yz: [f32; 3],
-    /// 1 for a body of a heap, whose contacts have other springs and no preload.
-    pub heap: f32,
+    #[doc(hidden)]
+    pub pad_inertia: f32,
     /// Gravity plus force over mass (m/s²).
     pub acceleration: [f32; 3],
     #[doc(hidden)]

@@ -24,12 +24,6 @@ pub fn softness(frequency: f32, damping_ratio: f32, h: f32, push_limit: f32) -> 
     Softness { bias_rate: omega / a1, mass_scale: a2 * a3, impulse_scale: a3, push_limit }
 }
 
-/// Stiffness of the springs of heaps over that of springs between bodies that can move elsewhere.
-pub const HEAP_STIFFNESS: f32 = 2.0;
-/// Damping of the contacts of heaps over that of other contacts. Dampers hold forces as they are: with 1 the forces of 64 points under a cube
-/// are uneven by 0.25 after 300 steps, with 0.5 by 0.04, with 0.3 by 0.006. With 0.3 or 1 mixed piles come to rest later than with 0.5.
-const HEAP_DAMPING: f32 = 0.5;
-
 impl Substep {
     /// A substep of `length` seconds.
     pub fn new(config: &SolverConfig, length: f32) -> Self {
@@ -40,15 +34,6 @@ impl Substep {
             fixed: contact_softness(config, length, config.fixed_contact_frequency_ratio),
             joint: joint_softness(config, length),
         }
-    }
-
-    /// A substep of `length` seconds of a heap: springs twice as stiff between bodies that can move, and equally stiff where bodies that cannot
-    /// are touched.
-    pub fn of_heap(config: &SolverConfig, length: f32) -> Self {
-        let frequency = HEAP_STIFFNESS.sqrt() * config.contact_frequency / length;
-        let damping = HEAP_DAMPING * config.contact_damping;
-        let springs = softness(frequency, damping, length, config.push_limit);
-        Self { movable: springs, fixed: springs, ..Self::new(config, length) }
     }
 }
 

@@ -12,7 +12,7 @@ use super::carry::Carry;
 use super::effective::{EffectiveMass, InverseMass};
 use super::points_a_slot;
 use super::prepare::{ComputedRow, Over, PoseRow, Prepare, What};
-use super::rescale::{change_compliance, change_share};
+use super::rescale::change_share;
 use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use super::slots::{Slot, Write};
 use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Pair};
@@ -28,7 +28,7 @@ pub(super) struct Writer<'a> {
     pub detector: &'a Detector,
     pub config: &'a SolverConfig,
     pub effort: &'a Effort,
-    /// Whether a class or a heap is not what the rows of the step before were written for.
+    /// Whether a class is not what the rows of the step before were written for.
     pub effort_changes: bool,
     /// Length of a substep of class 0 (s).
     pub substep: f32,
@@ -188,27 +188,16 @@ impl Writer<'_> {
         }
     }
 
-    /// Brings a contact to the substeps and springs of its island.
+    /// Brings a contact to the substeps of its island.
     fn follow_effort(&self, contact: &mut ContactRow, points: &[PointRow], impulses: &mut [ImpulseRow]) {
         let share = self.share(contact);
-        let is_new = contact.substep_share == 0.0;
-        let bodies = [contact.body_a, contact.body_b].map(|body| body as usize);
-        let [was, is] = [Effort::was_in_heap, Effort::is_in_heap]
-            .map(|in_heap| bodies.into_iter().any(|body| in_heap(self.effort, body)));
-        let both = bodies.into_iter().all(|body| self.masses[body].inv_mass > 0.0);
-        let preload = &self.carry.preload;
-        let count = contact.point_count as usize;
-        let sag = |share: f32, impulses: &[ImpulseRow]| {
+        if share != contact.substep_share {
+            let count = contact.point_count as usize;
             let pressed = impulses[..count].iter().map(|impulse| impulse.normal).sum();
             let mass = points[..count].iter().map(|point| point.normal_mass).sum();
-            preload.yielding::<f32>(share, both, was, pressed) * reciprocal::<f32>(mass)
-        };
-        if share != contact.substep_share {
-            change_share(contact, share, sag(contact.substep_share, impulses), points, impulses);
-        }
-        if was != is && !is_new {
-            let [before, now] = [was, is].map(|in_heap| preload.compliance::<f32>(both, in_heap));
-            change_compliance(contact, now * reciprocal(before), sag(share, impulses), points);
+            let both = [contact.body_a, contact.body_b].iter().all(|&body| self.masses[body as usize].inv_mass > 0.0);
+            let yields = self.carry.preload.yielding::<f32>(contact.substep_share, both, pressed);
+            change_share(contact, share, yields * reciprocal::<f32>(mass), points, impulses);
         }
     }
 

@@ -247,9 +247,7 @@ impl Structure {
             if has_preloads {
                 // The surfaces stay as far apart as they are.
                 let apart = if contacts.new_bodies()[bearing.upper as usize] { apart } else { 0.0 };
-                let in_heap =
-                    [bearing.upper, bearing.lower].iter().any(|&body| problem.masses[body as usize].heap > 0.0);
-                let yielding = contacts.carry.preload.yielding(contact.substep_share, are_movable, in_heap, pressed);
+                let yielding = contacts.carry.preload.yielding(contact.substep_share, are_movable, pressed);
                 contact.preload += (yielding + apart) / mass;
             }
         }

@@ -326,7 +326,7 @@ impl Stages {
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
         let Self { detector, sleep, effort, contacts, joints, problem, found, events, .. } = self;
         timed(&mut stats.times.prepare, || {
-            problem::begin(world, sleep.asleep(), config, effort, problem);
+            problem::begin(world, sleep.asleep(), config, problem);
             contacts.carry.on_device = on_device;
             // The work of a driven body follows from the impulses of the whole step.
             let drives = |body: &Body| body.kind != BodyKind::Dynamic && body.is_driven();

@@ -3,11 +3,11 @@
 use drystone::glam::Vec3;
 use drystone::{Body, Joint, Scene, Shape};
 
-/// A pile of boxes that fall, a tower under a top 1000 times as heavy, one under a top 60 times as heavy, a rod on a joint, and two
+/// A pile of boxes that fall, a tower under a top 1000 times as heavy, one under a top 100 times as heavy, a rod on a joint, and two
 /// chains with a heavy end, one of which lies on boxes.
 pub fn islands() -> Scene {
     let mut scene = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
-    for (x, ratio) in [(20.0, "1000"), (30.0, "60")] {
+    for (x, ratio) in [(20.0, "1000"), (30.0, "100")] {
         let tower =
             Scene::find("tower", &["n=6".into(), format!("top_ratio={ratio}")]).expect("a scene of the catalogue");
         for mut body in tower.world.bodies {

@@ -77,7 +77,7 @@ fn what_walls_hold_takes_no_more_substeps_than_its_weight_asks_for() {
         assert_eq!(simulation.substeps_of(cube), 8, "step {step}");
     }
     assert!(simulation.penetration().max > 0.04, "the walls hold it");
-    // The cube is free, and bears a thousand times its mass as one does that lies there and was never held.
+    // The cube is free, and bears a thousand times its mass no worse than one that lies there and was never held.
     simulation.world.remove(right);
     run(&mut simulation, 60);
     free.bodies[cube] = simulation.world.bodies[cube].clone();
@@ -86,7 +86,7 @@ fn what_walls_hold_takes_no_more_substeps_than_its_weight_asks_for() {
     run(&mut free, 60);
     let (never_held, expected) = loaded(&mut free, cube);
     assert!(substeps >= 32 && substeps == expected, "{substeps} and {expected} substeps");
-    assert!(held < 1e-3 && (held - never_held).abs() < 0.1 * never_held, "{held} m and {never_held} m");
+    assert!(held < 1e-3 && held < 1.1 * never_held, "{held} m and {never_held} m");
 }
 
 /// A press stops in a crate on the floor. The crate took 1,024 substeps and left at up to 428 m/s.
@@ -217,7 +217,7 @@ fn an_island_without_need_keeps_its_substeps() {
     };
     assert_eq!(substeps(|b| b.position.x < 15.0), [8], "the pile");
     assert_eq!(substeps(|b| (19.0..25.0).contains(&b.position.x)), [32], "the tower under 1000 times");
-    assert_eq!(substeps(|b| (29.0..35.0).contains(&b.position.x)), [16], "the tower under 60 times");
+    assert_eq!(substeps(|b| (29.0..35.0).contains(&b.position.x)), [16], "the tower under 100 times");
     assert_eq!(substeps(|b| (35.0..65.0).contains(&b.position.x)), [8], "what hangs free");
     let mut fixed = started(&scene, SolverConfig::default().with(|c| c.max_substeps = c.substeps));
     run(&mut fixed, 120);
@@ -243,17 +243,14 @@ fn several_efforts_have_the_bits_of_the_reference_on_all_lanes_and_threads() {
     }
 }
 
-/// Boxes that fall on each other become heaps of their own, which meet: the bits are those of the reference all the while.
+/// Boxes that fall on each other are islands of their own, which meet: the bits are those of the reference all the while.
 #[test]
-fn a_heap_has_the_bits_of_the_reference() {
+fn a_pile_has_the_bits_of_the_reference() {
     let scene = find("pile", &["n=60"]);
     let lanes = || Box::new(Cpu::new()) as Box<dyn Backend>;
     let mut open = |i: usize| Ok(if i == 0 { Box::new(Reference::<f32>::new()) as Box<_> } else { lanes() });
     let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 120, || ()).expect("both run");
     assert!(found.first.is_none(), "{:?}", found.first);
-    let mut simulation = started(&scene, SolverConfig::default());
-    run(&mut simulation, 120);
-    assert!(simulation.problem().masses.iter().any(|mass| mass.heap > 0.0), "no heap");
 }
 
 /// A system of joints takes the substeps of the island of its bodies, and each chain stays together with its own.
@@ -440,38 +437,30 @@ fn the_impulse_of_a_joint_follows_the_class() {
     assert_eq!(Vec3::from_array(next.joint_impulses[0].linear), before * (substeps / 8) as f32);
 }
 
-/// Boxes on several others have no preload: with it 150 boxes creep at 0.06 mm/s.
+/// The preloads of 150 boxes take out half of the overlap that their springs would have, and the boxes rest.
 #[test]
-fn a_heap_comes_to_rest() {
+fn a_pile_comes_to_rest() {
     let scene = find("pile", &["n=150"]);
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 450);
-    let heap = simulation.problem().masses.iter().filter(|mass| mass.heap > 0.0).count();
-    assert!(heap >= 100, "{heap} bodies of a heap");
-    // The preload is gone but for what decays.
-    let preloads = simulation.manifolds().map(|m| m.preload.abs()).fold(0.0, f32::max);
-    assert!(preloads < 1e-4, "{preloads} m");
     let (speed, overlap) = (rms_speed(&simulation.world), simulation.penetration().mean);
-    assert!(speed < 1e-5 && overlap < 0.3e-3, "{speed} m/s, {overlap} m");
+    assert!(speed < 1e-4 && overlap < 0.1e-3, "{speed} m/s, {overlap} m");
 }
 
-/// A sledge stands on a floor and in a wall, and so does a knob on it until it comes out first: three contacts are a heap, and two are none. The
-/// springs of the wall are stiffer then. Preloads took up most of the overlap, as if it bore a load: the sledge stopped inside of the wall.
+/// A sledge stands on a floor and in a wall, and so does a knob on it until it comes out first: three contacts of its island become two. Preloads
+/// that take up an overlap as if it bore a load stop the sledge inside of the wall.
 #[test]
-fn what_is_on_its_way_out_of_a_wall_comes_out_where_its_heap_ends() {
+fn a_sledge_comes_out_of_a_wall() {
     let mut world = World::new();
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     world.add(Body::fixed().shape(Shape::half_space(Vec3::X)));
     let knob = Shape::cuboid(0.1, 0.1, 0.1);
     let sledge = Body::dynamic().shape(Shape::cuboid(1.0, 0.1, 0.5)).position(-3.0, 0.1, 0.0);
-    let sledge = world.add(sledge.shape_at(knob, Vec3::new(0.9, 0.2, 0.0), Quat::IDENTITY));
+    world.add(sledge.shape_at(knob, Vec3::new(0.9, 0.2, 0.0), Quat::IDENTITY));
     let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
-    let is_in_heap = |simulation: &Simulation| simulation.problem().masses[sledge].heap > 0.0;
-    run(&mut simulation, 40);
-    assert!(is_in_heap(&simulation));
-    run(&mut simulation, 20);
+    run(&mut simulation, 60);
     let deepest = simulation.penetration().max;
-    assert!(!is_in_heap(&simulation) && deepest > 0.5, "{deepest} m");
+    assert!(deepest > 0.5, "{deepest} m");
     run(&mut simulation, 60);
     let deepest = simulation.penetration().max;
     assert!(deepest < 1e-3, "{deepest} m");

@@ -76,7 +76,7 @@ fn structures_that_are_built_in_place_do_not_sink_and_come_up_again() {
             let (deepest, rms) = (simulation.solved_penetration().max, rms_speed(&simulation.world));
             assert!(deepest < overlap && rms < speed, "{name} {parameters}, step {step}: {deepest} m, {rms} m/s");
             let borne = share_borne_by_the_floor(&mut simulation);
-            assert!((borne - 1.0).abs() < 0.02, "{name} {parameters}, step {step}: {borne} of its weight");
+            assert!((borne - 1.0).abs() < 0.025, "{name} {parameters}, step {step}: {borne} of its weight");
         }
     }
 }

@@ -34,7 +34,7 @@ const MASS: usize = 9;
 const JAMS: usize = 11;
 pub(super) const COLUMNS: usize = 12;
 
-/// Preloads of most contacts of a heap.
+/// Preloads of contacts that bear nothing.
 const PRELOADS: [f32; 2] = [0.0, -0.0];
 
 /// What a slot bears, and of its rows what does not follow from its manifold.
@@ -108,8 +108,7 @@ impl SlotLoads {
         if has_sag {
             let pressed = self.impulses[..contact.point_count as usize].iter().map(|impulse| impulse.normal).sum();
             let [a, b] = [contact.body_a, contact.body_b].map(inv_mass);
-            let in_heap = [contact.body_a, contact.body_b].iter().any(|&body| effort.is_in_heap(body as usize));
-            let yields = scale.map_or(0.0, |scale| scale.yielding(a > 0.0 && b > 0.0, in_heap, pressed));
+            let yields = scale.map_or(0.0, |scale| scale.yielding(a > 0.0 && b > 0.0, pressed));
             columns.near(SAG, &mut self.sag, yields * share * (a + b))?;
         }
         if has_need {
