@@ -28,7 +28,7 @@ use crate::residuals::Residuals;
 use crate::stats::{StepStats, Stopwatch, timed};
 #[cfg(doc)]
 use crate::world::Body;
-use crate::world::{BodyHandle, World};
+use crate::world::{BodyHandle, JointHandle, World};
 use stages::{Changes, Stages};
 
 pub use contacts::{Contact, ContactPoint};
@@ -612,6 +612,37 @@ impl Simulation {
     pub fn solved_penetration(&self) -> Penetration {
         let separations = |m: SolvedManifold| (0..m.points().len()).map(move |k| m.points()[k].separation);
         Penetration::of(self.manifolds().map(separations))
+    }
+
+    /// Force of a joint on its body b in the last step, in world axes (N). It is the mean over the step if the simulation
+    /// [listens](Self::listen), or if the world has a joint with a break force, a motor or a spring. Else, and for
+    /// sleeping bodies, it is the force of the last substep. `None` if the joint is gone, or took part in no step since it
+    /// was inserted or since the state was loaded.
+    ///
+    /// ```
+    /// use drystone::{Body, Joint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    ///
+    /// let mut world = World::new();
+    /// let wall = world.add(Body::fixed());
+    /// let beam = Body::dynamic().shape(Shape::cuboid(0.5, 0.05, 0.05)).total_mass(2.0);
+    /// let beam = world.add(beam.position(0.5, 0.0, 0.0));
+    /// let weld = world.insert_joint(Joint::new(wall, Vec3::ZERO, beam, Vec3::X * -0.5).fixed());
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// assert_eq!(simulation.joint_force(weld), None);
+    /// (0..120).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+    /// // The wall bears the weight of 2 kg at 0.5 m.
+    /// let [force, torque] = [simulation.joint_force(weld), simulation.joint_torque(weld)].map(Option::unwrap);
+    /// assert!((force - 19.62 * Vec3::Y).length() < 0.1 && (torque - 9.81 * Vec3::Z).length() < 0.1, "{force} {torque}");
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn joint_force(&self, joint: JointHandle) -> Option<glam::Vec3> {
+        self.stages.joint_load(&self.world, joint).map(|[force, _]| force)
+    }
+
+    /// Torque of a joint on its body b about the anchor on body a, in world axes (N m). It sums the locks, limits, motors
+    /// and springs of angles, over the same time as [`Self::joint_force`], and is `None` where that is.
+    pub fn joint_torque(&self, joint: JointHandle) -> Option<glam::Vec3> {
+        self.stages.joint_load(&self.world, joint).map(|[_, torque]| torque)
     }
 
     /// Impulse of each joint on its body b in the last substep ([`Self::substeps_of`]), in world axes (N s).

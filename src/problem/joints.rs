@@ -25,6 +25,8 @@ pub struct JointRows {
     graph: ConstraintGraph,
     /// The coloring of all joints.
     pub coloring: Coloring,
+    /// Whether the step sums the impulses of all joints over its substeps.
+    pub sums: bool,
     is_colored: bool,
     /// The length of the substeps that each impulse belongs to, over that of class 0; 0 without an impulse.
     shares: Vec<f32>,
@@ -55,7 +57,7 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     left,
-} scratch { graph, gap_of_turns, lent });
+} scratch { graph, sums, gap_of_turns, lent });
 
 /// How much further a joint of a net that swings may open in the next step.
 const GROWTH: f32 = 2.5;
@@ -87,6 +89,19 @@ impl JointRows {
     /// Whether the rows are those of the joints of the world.
     pub fn are_of(&self, world: &World) -> bool {
         self.joints == *world.joints && self.handles == world.joints.handles()
+    }
+
+    /// The row of a joint in the last step.
+    pub fn row_of(&self, world: &World, joint: JointHandle) -> Option<usize> {
+        // Rows are in the order of the joints before the caller or the step removed some.
+        let now = world.joints.index(joint)?;
+        let is_here = |&row: &usize| self.handles.get(row) == Some(&joint);
+        Some(now).filter(is_here).or_else(|| self.handles.iter().position(|handle| *handle == joint))
+    }
+
+    /// The length of a substep of a joint in the last step, over that of class 0.
+    pub fn share(&self, row: usize) -> f32 {
+        self.shares[row]
     }
 
     /// Refuses rows that name bodies, joints or systems that are not there.
@@ -379,7 +394,7 @@ impl JointRows {
             let (a, b) = joint.indices();
             joint.can_break() || joint.is_driven() || is_driven(a) || b.is_some_and(is_driven)
         };
-        if world.joints.iter().any(is_measured) {
+        if self.sums || world.joints.iter().any(is_measured) {
             // A joint that takes no part bears nothing that could break it.
             problem.joint_totals.resize(problem.joint_impulses.len(), JointImpulseRow::default());
         }

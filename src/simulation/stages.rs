@@ -1,6 +1,7 @@
 //! All state that lasts from step to step, except the copy on a device. It has the stages of a step before and after
 //! the backend.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::by_body::ByBody;
@@ -11,12 +12,12 @@ use crate::effort::Effort;
 use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
+use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRow, JointRows, StepProblem, StepScale};
 use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{Body, BodyKind, Surface, World};
+use crate::world::{Body, BodyKind, JointHandle, Surface, World};
 
 /// Everything that a step passes to the next one, except the data on a device.
 pub(super) struct Stages {
@@ -332,6 +333,7 @@ impl Stages {
             let drives = |body: &Body| body.kind != BodyKind::Dynamic && body.is_driven();
             contacts.sums = events.listen.sums() || world.bodies.iter().any(drives);
             contacts.write(world, detector, config, effort, dt, problem);
+            joints.sums = events.listen.sums();
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
@@ -384,6 +386,22 @@ impl Stages {
             }));
             events.note_hits(met);
         }
+    }
+
+    /// Force (N) of a joint on its body b in the last step, and torque about the anchor (N m), in world axes.
+    pub fn joint_load(&self, world: &World, joint: JointHandle) -> Option<[Vec3; 2]> {
+        let Self { joints, problem, sleep, key, .. } = self;
+        let row = joints.row_of(world, joint)?;
+        // A loaded state has no rows before its next step.
+        let JointRow { body_a, body_b, .. } = *problem.joints.get(row)?;
+        let step = key.scale?.step(key.config.substeps);
+        let sleeps = |body: u32| sleep.asleep().get(body as usize) == Some(&true);
+        // A step leaves the sums of sleeping joints at 0.
+        let (impulses, time) = match problem.joint_totals.is_empty() || sleeps(body_a) || sleeps(body_b) {
+            true => (&problem.joint_impulses, step / key.config.substeps as f32 * joints.share(row)),
+            false => (&problem.joint_totals, step),
+        };
+        Some([problem.joint_impulse(impulses, row), problem.axis_impulse(impulses, row, false)].map(|j| j / time))
     }
 
     /// Removes the joints that carried more than their break force in the step.

@@ -24,6 +24,7 @@ mod golden_gpu;
 #[cfg(feature = "serde")]
 mod gpu;
 mod jamming;
+mod joint_forces;
 mod joint_kinds;
 mod joints;
 mod kernels;
@@ -57,6 +58,7 @@ fn main() -> std::process::ExitCode {
         #[cfg(feature = "serde")]
         gpu::tests(),
         jamming::tests(),
+        joint_forces::tests(),
         joint_kinds::tests(),
         joints::tests(),
         kernels::tests(),
