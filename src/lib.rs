@@ -93,8 +93,8 @@ pub use problem::StepProblem;
 pub use recording::{Recorder, RecordingIntervals, Replay, ReplayDifference};
 pub use scenes::Scene;
 pub use simulation::{
-    ColliderOf, Contact, ContactPoint, Event, Hit, Listen, Rollback, Simulation, Snapshot, SolvedManifold, SolvedPoint,
-    Summed,
+    ColliderOf, Contact, ContactHooks, ContactPoint, Event, Hit, Listen, PendingContact, PendingPoint, Rollback,
+    Simulation, Snapshot, SolvedManifold, SolvedPoint, Summed,
 };
 pub use stats::StepStats;
 pub use world::{

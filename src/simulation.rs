@@ -6,6 +6,7 @@ mod by_body;
 mod contacts;
 mod events;
 mod hash;
+mod hooks;
 mod manifolds;
 mod rollback;
 mod saved;
@@ -34,6 +35,7 @@ use stages::{Changes, Stages};
 pub use contacts::{Contact, ContactPoint};
 pub use events::{ColliderOf, Event, Hit, Listen};
 pub(crate) use hash::hashes;
+pub use hooks::{ContactHooks, PendingContact, PendingPoint};
 pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 pub use rollback::Rollback;
 pub use saved::Snapshot;
@@ -119,6 +121,7 @@ pub struct Simulation {
     state: u64,
     /// Whether the future of a step is pending, or was dropped before it completed.
     is_pending: bool,
+    hooks: Option<Box<dyn ContactHooks>>,
 }
 
 /// A new state number.
@@ -153,6 +156,7 @@ impl Simulation {
             unfinished: None,
             state: next_state(),
             is_pending: false,
+            hooks: None,
         }
     }
 
@@ -214,6 +218,14 @@ impl Simulation {
         self.on_device = false;
         self.stages.events.listen(listen);
         Ok(())
+    }
+
+    /// Sets the hooks that refuse pairs and change contacts from the next step on, or removes them. Sleeping bodies are
+    /// not asked: [wake](Self::wake) those whose contacts change. Hooks belong to this simulation, and not to its state:
+    /// a fork or a loaded run has none.
+    pub fn set_hooks(&mut self, hooks: Option<Box<dyn ContactHooks>>) {
+        self.unfinished = None;
+        self.hooks = hooks;
     }
 
     /// The events and sums that the simulation reports.
@@ -373,22 +385,20 @@ impl Simulation {
         if changes.all_rows() || self.stages.contacts.are_unsorted() {
             self.on_device = false;
         }
-        let Self { world, config, stages, on_device, .. } = self;
+        let Self { world, config, stages, on_device, hooks, .. } = self;
         let assembled = panics::caught(|| {
             stages.follow(world, config, dt, &changes);
             if stages.is_everything_still(world, stats) {
-                return false;
+                return Ok(false);
             }
-            if stages.find(world, config, dt, stats) {
+            if stages.find(world, config, dt, hooks.as_deref_mut(), stats)? {
                 *on_device = false;
             }
             stages.prepare(world, config, dt, *on_device, stats);
-            true
+            Ok(true)
         });
-        let is_assembled = assembled.map_err(|panic| {
-            self.begin_anew();
-            self.panicked(panic)
-        })?;
+        let assembled = assembled.unwrap_or_else(|panic| Err(self.panicked(panic)));
+        let is_assembled = assembled.inspect_err(|_| self.begin_anew())?;
         if is_assembled && self.stages.is_foreign {
             self.check_foreign()?;
         }
@@ -498,11 +508,11 @@ impl Simulation {
             let mut next = self.stages.clone();
             next.follow(&self.world, &self.config, dt, &changes);
             next.is_everything_still(&self.world, &mut StepStats::default());
-            next.find(&self.world, &self.config, dt, &mut StepStats::default());
+            next.find(&self.world, &self.config, dt, self.hooks.as_deref_mut(), &mut StepStats::default())?;
             next.prepare(&self.world, &self.config, dt, false, &mut StepStats::default());
-            (next.problem, next.plan)
+            Ok((next.problem, next.plan))
         });
-        assembled.map_err(|panic| self.panicked(panic))
+        assembled.unwrap_or_else(|panic| Err(self.panicked(panic)))
     }
 
     /// A view of the bodies at their present poses, for rays, shape casts, points and boxes. It uses the tree of the

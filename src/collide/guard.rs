@@ -193,6 +193,9 @@ impl Detector {
                 if other.body == i || !is_met || !groups[0].meets(groups[1]) || self.jointed.contains(&pair) {
                     return;
                 }
+                if self.is_refused(c, other) {
+                    return;
+                }
                 let others = self.way_of(world, other.body, dt);
                 let until = if is_pushed { Until::Touch } else { Until::Deep };
                 let standing = Swept::new(other, &self.moving[other.body as usize], &others);

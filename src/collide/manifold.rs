@@ -103,6 +103,17 @@ impl Manifold {
         self.count = 0;
     }
 
+    /// Keeps the points for which `kept` is true. The points of a reused manifold have the impulses at their own places.
+    pub(super) fn keep(&mut self, kept: &[bool; MAX_POINTS], is_reused: bool) {
+        let mut count = 0;
+        for k in (0..usize::from(self.count)).filter(|&k| kept[k]) {
+            let before = if is_reused { Some(k as u8) } else { self.points[k].before };
+            self.points[count] = ManifoldPoint { before, ..self.points[k] };
+            count += 1;
+        }
+        self.count = count as u8;
+    }
+
     /// Whether it has ended.
     pub(crate) fn has_ended(&self) -> bool {
         self.count == 0

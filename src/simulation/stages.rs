@@ -6,11 +6,13 @@ use rayon::prelude::*;
 
 use super::by_body::ByBody;
 use super::events::{ColliderOf, Event, Events, Hit, Met};
-use crate::collide::{DetectStats, Detector};
+use super::hooks::ContactHooks;
+use crate::collide::{Activity, ColliderSide, DetectStats, Detector, PairFilter};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
+use crate::panics::blaming;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRow, JointRows, StepProblem, StepScale};
 use crate::rest;
@@ -279,10 +281,21 @@ impl Stages {
         self.sleep.is_everything_still()
     }
 
-    /// Detects contacts, colors them, and chooses the substep level of each island. Returns true if the rows on a
-    /// device no longer fit: an island has another level, or a body rests where it touched nothing before.
-    pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
-        let Self { detector, sleep, effort, energy, contacts, joints, problem, found, by_body, .. } = self;
+    /// Detects contacts, lets hooks change them, colors them, and chooses the substep level of each island. Returns true
+    /// if the rows on a device no longer fit: an island has another level, a body rests where it touched nothing before,
+    /// or a contact has another material.
+    ///
+    /// # Errors
+    /// A hook sets a material that is out of range.
+    pub fn find(
+        &mut self,
+        world: &World,
+        config: &SolverConfig,
+        dt: f32,
+        mut hooks: Option<&mut (dyn ContactHooks + 'static)>,
+        stats: &mut StepStats,
+    ) -> Result<bool> {
+        let Self { detector, sleep, problem, contacts, found, by_body, .. } = self;
         // Rows can change places. A step that fails makes no new lists.
         by_body.forget();
         let times = &mut stats.times;
@@ -290,19 +303,35 @@ impl Stages {
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
         *found = timed(&mut times.detect, || {
             detector.end_teleported(world);
-            let mut found = detector.detect(world, config, dt, sleep.activity());
+            let mut detect = |detector: &mut Detector, activity: &[Activity]| {
+                let mut may_touch = hooks.as_deref_mut().map(|hooks| {
+                    move |sides: [ColliderSide; 2]| {
+                        let [a, b] = sides.map(|side| collider_of(world, side));
+                        blaming(sides.map(|side| side.0), || hooks.may_touch(world, a, b))
+                    }
+                });
+                let filter = may_touch.as_mut().map(|filter| filter as &mut PairFilter);
+                detector.detect(world, config, dt, activity, filter)
+            };
+            let mut found = detect(detector, sleep.activity());
             contacts.follow(world, detector);
             // A body that wakes takes part in this step.
             while sleep.wake_touched(world, detector) {
                 let before = found;
-                found = detector.detect(world, config, dt, sleep.activity());
+                found = detect(detector, sleep.activity());
                 contacts.follow(world, detector);
                 found.computed += before.computed;
                 found.reshaped |= before.reshaped;
             }
             found
         });
-        timed(&mut times.color, || {
+        let modified = self.modify_contacts(world, hooks)?;
+        if modified.materials {
+            self.plan_key = None;
+        }
+        let Self { detector, sleep, effort, energy, contacts, joints, problem, found, .. } = self;
+        found.reshaped |= modified.points;
+        let changes_class = timed(&mut times.color, || {
             if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
                 contacts.color(world, config.max_colors);
                 energy.follow_contacts();
@@ -320,7 +349,8 @@ impl Stages {
             let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));
             let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above(world);
             effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
-        })
+        });
+        Ok(changes_class || modified.materials)
     }
 
     /// Prepares and plans the step. With `on_device`, the device continues from its own rows.

@@ -64,6 +64,14 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Refuses a coefficient that is out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self { friction, restitution } = *self;
+        let is_friction = friction >= 0.0 && friction.is_finite();
+        ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
+        ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))
+    }
+
     /// The material of a contact between `self` and `other`.
     pub fn combine(self, other: Self) -> Self {
         Self { friction: (self.friction * other.friction).sqrt(), restitution: self.restitution.max(other.restitution) }
@@ -713,6 +721,11 @@ impl Body {
         Vec3::select(glam::BVec3::new(x, y, z), Vec3::ZERO, spin)
     }
 
+    /// The material of the contact of two bodies, at colliders of these indices.
+    pub(crate) fn contact_material([a, b]: [&Self; 2], _colliders: [u32; 2]) -> Material {
+        a.material.combine(b.material)
+    }
+
     /// The properties for which its rows are written, in addition to its shapes.
     pub(crate) fn surface(&self) -> Surface {
         Surface { mass: self.mass, locked_rotations: self.locked_rotations, material: self.material }
@@ -933,10 +946,7 @@ impl Body {
 
     /// Refuses a mass or a material that cannot be simulated.
     pub(super) fn check_surface(&self) -> Result<()> {
-        let Material { friction, restitution } = self.material;
-        let is_friction = friction >= 0.0 && friction.is_finite();
-        ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
-        ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))?;
+        self.material.check()?;
         self.additional.check_additional().map_err(|e| e.within("additional_mass"))?;
         if self.kind == BodyKind::Dynamic { self.check_mass() } else { self.mass.check_frame() }
     }

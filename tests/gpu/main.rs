@@ -23,6 +23,7 @@ mod forces;
 mod golden_gpu;
 #[cfg(feature = "serde")]
 mod gpu;
+mod hooks;
 mod jamming;
 mod joint_forces;
 mod joint_kinds;
@@ -57,6 +58,7 @@ fn main() -> std::process::ExitCode {
         golden_gpu::tests(),
         #[cfg(feature = "serde")]
         gpu::tests(),
+        hooks::tests(),
         jamming::tests(),
         joint_forces::tests(),
         joint_kinds::tests(),
