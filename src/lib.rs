@@ -98,7 +98,7 @@ pub use simulation::{
 };
 pub use stats::StepStats;
 pub use world::{
-    Axis, Body, BodyHandle, BodyKind, Bounds, Drive, Groups, Joint, JointHandle, JointMotion, Linear, MassProperties,
+    Axis, Body, BodyHandle, BodyKind, Bounds, CombineRule, Drive, Groups, Joint, JointHandle, JointMotion, Linear, MassProperties,
     Material, Shape, World,
 };
 

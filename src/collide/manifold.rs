@@ -285,6 +285,18 @@ mod tests {
     }
 
     #[test]
+    fn points_that_are_kept_know_where_their_impulses_are() {
+        let mut computed = Manifold::new(Vec3::Y, (0, 0), &octagon()[..4]);
+        computed.points[3].before = Some(1);
+        for (is_reused, expected) in [(false, [None, Some(1)]), (true, [Some(1), Some(3)])] {
+            let mut m = computed.clone();
+            m.keep(&[false, true, false, true], is_reused);
+            assert_eq!(before(&m), expected);
+            assert_eq!([0, 1].map(|k| m.points()[k].anchor_a), [1, 3].map(|k| computed.points()[k].anchor_a));
+        }
+    }
+
+    #[test]
     fn points_in_a_line_become_its_ends() {
         let points = [0.0, 1.0, 2.0, 3.0, 4.0].map(|x| point(x, 0.0, -0.001));
         let m = Manifold::new(Vec3::Y, (0, 0), &points);

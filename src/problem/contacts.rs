@@ -81,10 +81,10 @@ crate::saved::fields!(Materials { bounce, may_jam });
 
 impl Materials {
     fn of(world: &World) -> Self {
-        let any = |has: fn(&Body) -> bool| world.bodies.iter().any(has);
+        let any = |has: fn(Material) -> bool| world.bodies.iter().flat_map(Body::materials).any(has);
         Self {
-            bounce: any(|body| body.material.restitution > 0.0),
-            may_jam: any(|body| body.material.friction > LEAST_JAMMING),
+            bounce: any(|material| material.restitution > 0.0),
+            may_jam: any(|material| material.friction > LEAST_JAMMING),
         }
     }
 }

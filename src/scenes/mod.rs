@@ -11,7 +11,7 @@ mod spawners;
 pub use catalogue::{CATALOGUE, Entry, Family, Law, Member, Parameter};
 #[cfg(feature = "serde")]
 pub use file::{
-    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile,
+    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MaterialFile, MotorFile,
     SceneFile, ShapeFile, SpawnerFile, SpringFile, load, schema,
 };
 pub use scene::{Group, Scene};

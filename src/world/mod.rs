@@ -18,7 +18,7 @@ mod tag;
 
 pub use bodies::{Bodies, BodyHandle};
 pub(crate) use body::Surface;
-pub use body::{Body, BodyKind, Collider, Material};
+pub use body::{Body, BodyKind, Collider, CombineRule, Material};
 pub(crate) use change::WorldChange;
 pub use groups::Groups;
 pub use joint::{Joint, Linear};

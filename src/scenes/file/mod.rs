@@ -7,7 +7,7 @@ mod schema;
 mod write;
 
 pub use schema::{
-    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile,
+    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MaterialFile, MotorFile,
     SceneFile, ShapeFile, SpawnerFile, SpringFile,
 };
 
