@@ -98,8 +98,8 @@ pub use simulation::{
 };
 pub use stats::StepStats;
 pub use world::{
-    Axis, Body, BodyHandle, BodyKind, Bounds, CombineRule, Drive, Groups, Joint, JointHandle, JointMotion, Linear, MassProperties,
-    Material, Shape, World,
+    Axis, Body, BodyHandle, BodyKind, Bounds, CombineRule, Drive, Groups, Joint, JointHandle, JointMotion, Linear,
+    MassProperties, Material, Shape, World,
 };
 
 /// The example of the README, compiled and run with the other documentation tests.

@@ -174,7 +174,7 @@ fn aim(drive: &mut Drive) -> Option<&mut f32> {
     match drive {
         Drive::None => None,
         Drive::Motor { speed, .. } => Some(speed),
-        Drive::Spring { target, .. } => Some(target),
+        Drive::Spring { target, .. } | Drive::SpringDamper { target, .. } => Some(target),
     }
 }
 

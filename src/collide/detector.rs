@@ -49,7 +49,16 @@ pub struct Detector {
     pub(super) refused: HashSet<[ColliderSide; 2]>,
 }
 
-crate::saved::cloned!(Detector { worlds, known, kinds, groups, extents, left, jointed, refused } scratch { moving, falls, overlaps });
+crate::saved::cloned!(Detector {
+    worlds,
+    known,
+    kinds,
+    groups,
+    extents,
+    left,
+    jointed,
+    refused,
+} scratch { moving, falls, overlaps });
 
 /// A body, as the detector knows it.
 #[derive(Clone, Copy, Default)]
@@ -64,7 +73,7 @@ crate::saved::fields!(KnownBody { generation, world, colliders });
 
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
 fn jointed(world: &World) -> HashSet<(u32, u32)> {
-    let apart = world.joints.iter().filter(|joint| !joint.collide);
+    let apart = world.joints.iter().filter(|joint| joint.enabled && !joint.collide);
     let ends = |joint: &Joint| (joint.body_a.index() as u32, joint.body_b.map(|b| b.index() as u32));
     apart.map(ends).filter_map(|(a, b)| Some(key(a, b?))).collect()
 }
@@ -299,9 +308,9 @@ impl Detector {
         wanted.map(|(place, _)| place).collect()
     }
 
-    /// Keeps those points of the manifolds of a pair for which `kept` is true, until the next detection computes the pair
-    /// again. If no point is left, the colliders pass through each other. `is_reused`: the manifolds are those of the
-    /// step before.
+    /// Keeps those points of the manifolds of a pair for which `kept` is true, until the next detection computes the
+    /// pair again. If no point is left, the colliders pass through each other. `is_reused`: the manifolds are those of
+    /// the step before.
     pub(crate) fn drop_points(&mut self, [part, pair]: [u32; 2], kept: &[[bool; MAX_POINTS]], is_reused: bool) {
         let Self { worlds, refused, .. } = self;
         let own = worlds[part as usize].drop_points(pair, kept, is_reused);
@@ -329,7 +338,7 @@ impl Detector {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
         let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i), world.gravity_on(i));
         world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
-        for (a, b) in world.joints.iter().map(Joint::indices) {
+        for (a, b) in world.joints.iter().filter(|joint| joint.enabled).map(Joint::indices) {
             [Some(a), b].into_iter().flatten().for_each(|body| self.moving[body].tied = 1.0);
         }
         self.falls.clear();

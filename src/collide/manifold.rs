@@ -103,7 +103,8 @@ impl Manifold {
         self.count = 0;
     }
 
-    /// Keeps the points for which `kept` is true. The points of a reused manifold have the impulses at their own places.
+    /// Keeps the points for which `kept` is true. The points of a reused manifold have the impulses at their own
+    /// places.
     pub(super) fn keep(&mut self, kept: &[bool; MAX_POINTS], is_reused: bool) {
         let mut count = 0;
         for k in (0..usize::from(self.count)).filter(|&k| kept[k]) {

@@ -6,9 +6,9 @@ use parry3d::query::TrackedContact;
 use parry3d::shape::TypedShape;
 
 use super::collider::{BodyState, ColliderInfo};
+use super::detector::{ColliderSide, in_order};
 use super::facet::composite_contacts;
 use super::flush::{FlushScratch, Neighbors};
-use super::detector::{ColliderSide, in_order};
 use super::manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, empty, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};

@@ -113,8 +113,8 @@ impl ContactRows {
         }
     }
 
-    /// Sets the material that hooks give to the contact in a row, or that it has its own. Returns whether that changes its
-    /// rows.
+    /// Sets the material that hooks give to the contact in a row, or that it has its own. Returns whether that changes
+    /// its rows.
     pub fn set_hooked(&mut self, row: u32, material: Option<Material>) -> bool {
         let row = row as usize;
         if self.hooked.get(row).copied().flatten() == material {

@@ -257,12 +257,15 @@ impl JointRows {
         self.chosen_for = None;
         self.edges = edges;
         let old = std::mem::take(&mut problem.joint_impulses);
-        let impulse = |from: &Option<usize>| from.and_then(|i| old.get(i).copied()).unwrap_or_default();
-        problem.joint_impulses = from.iter().map(impulse).collect();
+        // A joint that is off bears nothing.
+        let impulse = |(from, joint): (&Option<usize>, &Joint)| {
+            from.filter(|_| joint.enabled).and_then(|i| old.get(i).copied()).unwrap_or_default()
+        };
+        problem.joint_impulses = from.iter().zip(now.iter()).map(impulse).collect();
         // Impulses of axes follow if the joint has the same axes as before.
         let firsts: Vec<usize> = first_axes(&before).collect();
         for (joint, from) in now.iter().zip(&from) {
-            let same = from.filter(|&i| axes::kinds(&before[i]).eq(axes::kinds(joint)));
+            let same = from.filter(|&i| joint.enabled && axes::kinds(&before[i]).eq(axes::kinds(joint)));
             let axis = |k: usize| same.and_then(|i| old.get(before.len() + firsts[i] + k).copied()).unwrap_or_default();
             problem.joint_impulses.extend((0..axes::kinds(joint).count()).map(axis));
         }
@@ -411,6 +414,9 @@ impl JointRows {
                 problem.torques.push(TorqueRow::NONE);
             }
             problem.params.body_count += 1;
+        }
+        for (i, joint) in world.joints.iter().enumerate().filter(|(_, joint)| axes::has_spring_dampers(joint)) {
+            axes::tune(joint, i, substep * self.shares[i], problem);
         }
     }
 }

@@ -214,13 +214,7 @@ impl Writer<'_> {
         }
     }
 
-    fn write_header(
-        &self,
-        row: &mut ContactRow,
-        (number, slot): (usize, &Slot),
-        pair: &Pair,
-        manifold: &Manifold,
-    ) {
+    fn write_header(&self, row: &mut ContactRow, (number, slot): (usize, &Slot), pair: &Pair, manifold: &Manifold) {
         let bodies = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
         let hooked = self.hooked.get(number).copied().flatten();
         let material = hooked.unwrap_or_else(|| Body::contact_material(bodies, pair.colliders));

@@ -185,17 +185,8 @@ impl Simulation {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self {
-            world,
-            config,
-            backend: _,
-            stages,
-            on_device: _,
-            unfinished: _,
-            state: _,
-            is_pending: _,
-            hooks: _,
-        } = self;
+        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, state: _, is_pending: _, hooks: _ } =
+            self;
         world.walk(archive)?;
         config.walk(archive)?;
         if A::READS {

@@ -14,7 +14,9 @@ use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
 use crate::panics::blaming;
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRow, JointRows, StepProblem, StepScale};
+use crate::problem::{
+    self, Approach, ColliderPair, ContactRows, ContactSummary, JointRow, JointRows, StepProblem, StepScale,
+};
 use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
@@ -281,9 +283,9 @@ impl Stages {
         self.sleep.is_everything_still()
     }
 
-    /// Detects contacts, lets hooks change them, colors them, and chooses the substep level of each island. Returns true
-    /// if the rows on a device no longer fit: an island has another level, a body rests where it touched nothing before,
-    /// or a contact has another material.
+    /// Detects contacts, lets hooks change them, colors them, and chooses the substep level of each island. Returns
+    /// true if the rows on a device no longer fit: an island has another level, a body rests where it touched nothing
+    /// before, or a contact has another material.
     ///
     /// # Errors
     /// A hook sets a material that is out of range.

@@ -253,7 +253,11 @@ impl World {
 
     /// Largest error of any joint (m): the distance of its anchors along locked axes, and beyond its limits.
     pub fn joint_gap(&self) -> f32 {
-        self.joints.iter().map(|joint| self.joint_motion(joint).gap(joint)).fold(0.0, f32::max)
+        self.joints
+            .iter()
+            .filter(|joint| joint.enabled)
+            .map(|joint| self.joint_motion(joint).gap(joint))
+            .fold(0.0, f32::max)
     }
 
     /// Refuses a world that cannot be simulated:

@@ -39,6 +39,7 @@ mod saved_problem;
 mod solver;
 #[cfg(feature = "serde")]
 mod spin;
+mod spring_dampers;
 mod teleports;
 mod waits;
 
@@ -74,6 +75,7 @@ fn main() -> std::process::ExitCode {
         solver::tests(),
         #[cfg(feature = "serde")]
         spin::tests(),
+        spring_dampers::tests(),
         teleports::tests(),
         waits::tests(),
     ])

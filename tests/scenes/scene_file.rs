@@ -489,7 +489,7 @@ fn the_schema_describes_every_key() {
     assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "material position rotation sensor");
     assert_eq!(schema["$defs"]["ShapeFile"]["unevaluatedProperties"], false);
     let joint = &schema["$defs"]["JointFile"];
-    assert_eq!(keys(joint), "anchor anchors bodies break_force collide");
+    assert_eq!(keys(joint), "anchor anchors bodies break_force collide enabled");
     assert_eq!((&joint["required"], &joint["unevaluatedProperties"]), (&json!(["bodies"]), &json!(false)));
     let kinds = joint["oneOf"].as_array().expect("kinds").iter();
     let kinds: Vec<_> = kinds.map(|kind| kind["properties"]["type"]["const"].clone()).collect();

@@ -30,6 +30,9 @@ impl Debug for Content<'_> {
             content.field("linear", &joint.linear).field("angular", &joint.angular);
         }
         content.field("collide", &joint.collide);
+        if !joint.enabled {
+            content.field("enabled", &joint.enabled);
+        }
         if !joint.is_ball() {
             content.field("break_force", &joint.break_force);
         }

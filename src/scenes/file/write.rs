@@ -159,6 +159,7 @@ fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {
         anchor: None,
         anchors: Some([joint.anchor_a, joint.anchor_b].map(|anchor| numbers(anchor.to_array()))),
         collide: joint.collide,
+        enabled: joint.enabled,
         break_force: joint.can_break().then(|| number(joint.break_force)),
         kind,
     })
@@ -177,8 +178,20 @@ fn axis(axis: &Axis) -> AxisFile {
         Drive::Spring { target, frequency, damping_ratio, max_load } => {
             file.spring = Some(SpringFile {
                 target: number(target),
-                frequency: number(frequency),
-                damping_ratio: number(damping_ratio),
+                frequency: Some(number(frequency)),
+                damping_ratio: Some(number(damping_ratio)),
+                stiffness: None,
+                damping: None,
+                max_load: (max_load < f32::MAX).then(|| number(max_load)),
+            });
+        }
+        Drive::SpringDamper { target, stiffness, damping, max_load } => {
+            file.spring = Some(SpringFile {
+                target: number(target),
+                frequency: None,
+                damping_ratio: None,
+                stiffness: Some(number(stiffness)),
+                damping: Some(number(damping)),
                 max_load: (max_load < f32::MAX).then(|| number(max_load)),
             });
         }

@@ -93,8 +93,8 @@ fn surfaces_combine_by_the_later_of_their_rules() {
     near("slide", simulation.world.bodies[1].position.x, expected, 0.005 * expected);
 }
 
-/// A sled on two runners, whose own friction is 0.1 on a floor of 0.9: 0.3 brakes it, whatever the friction of its seat. The runners get
-/// rougher while it slides.
+/// A sled on two runners, whose own friction is 0.1 on a floor of 0.9: 0.3 brakes it, whatever the friction of its
+/// seat. The runners get rougher while it slides.
 #[test]
 fn a_shape_has_its_own_friction() {
     let runner = |z: f32| Collider {
