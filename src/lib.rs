@@ -93,13 +93,13 @@ pub use problem::StepProblem;
 pub use recording::{Recorder, RecordingIntervals, Replay, ReplayDifference};
 pub use scenes::Scene;
 pub use simulation::{
-    ColliderOf, Contact, ContactPoint, Event, Hit, Listen, Rollback, Simulation, Snapshot, SolvedManifold, SolvedPoint,
-    Summed,
+    ColliderOf, Contact, ContactHooks, ContactPoint, Event, Hit, Listen, PendingContact, PendingPoint, Rollback,
+    Simulation, Snapshot, SolvedManifold, SolvedPoint, Summed,
 };
 pub use stats::StepStats;
 pub use world::{
-    Axis, Body, BodyHandle, BodyKind, Bounds, Drive, Groups, Joint, JointHandle, JointMotion, Linear, MassProperties,
-    Material, Shape, World,
+    Axis, Body, BodyHandle, BodyKind, Bounds, CombineRule, Drive, Groups, Joint, JointHandle, JointMotion, Linear,
+    MassProperties, Material, Shape, World,
 };
 
 /// The example of the README, compiled and run with the other documentation tests.

@@ -38,7 +38,7 @@ impl Penetration {
     pub fn of_world(world: &World, config: &SolverConfig) -> Self {
         let world = fit(world);
         let mut detector = Detector::new(&world);
-        detector.detect(&world, config, 0.0, &[]);
+        detector.detect(&world, config, 0.0, &[], None);
         let manifolds = detector.pairs().flat_map(|pair| &pair.manifolds);
         Self::of(manifolds.map(|manifold| manifold.points().iter().map(|point| point.separation)))
     }

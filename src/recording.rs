@@ -80,7 +80,7 @@ pub struct Recorder<W: Write> {
 /// The first bytes of a recording.
 const MAGIC: [u8; 8] = *b"drystrec";
 /// The format version. It grows with every change of the format.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Size of the header of a part (bytes): its kind, its length and its hash.
 const PART: usize = 1 + 8 + 8;
 

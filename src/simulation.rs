@@ -6,6 +6,7 @@ mod by_body;
 mod contacts;
 mod events;
 mod hash;
+mod hooks;
 mod manifolds;
 mod rollback;
 mod saved;
@@ -28,12 +29,13 @@ use crate::residuals::Residuals;
 use crate::stats::{StepStats, Stopwatch, timed};
 #[cfg(doc)]
 use crate::world::Body;
-use crate::world::{BodyHandle, World};
+use crate::world::{BodyHandle, JointHandle, World};
 use stages::{Changes, Stages};
 
 pub use contacts::{Contact, ContactPoint};
 pub use events::{ColliderOf, Event, Hit, Listen};
 pub(crate) use hash::hashes;
+pub use hooks::{ContactHooks, PendingContact, PendingPoint};
 pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 pub use rollback::Rollback;
 pub use saved::Snapshot;
@@ -119,6 +121,7 @@ pub struct Simulation {
     state: u64,
     /// Whether the future of a step is pending, or was dropped before it completed.
     is_pending: bool,
+    hooks: Option<Box<dyn ContactHooks>>,
 }
 
 /// A new state number.
@@ -153,6 +156,7 @@ impl Simulation {
             unfinished: None,
             state: next_state(),
             is_pending: false,
+            hooks: None,
         }
     }
 
@@ -214,6 +218,29 @@ impl Simulation {
         self.on_device = false;
         self.stages.events.listen(listen);
         Ok(())
+    }
+
+    /// Sets the hooks that refuse pairs and change contacts from the next step on, or removes them. Sleeping bodies are
+    /// not asked: [wake](Self::wake) those whose contacts change. Hooks belong to this simulation, and not to its
+    /// state: a fork or a loaded run has none.
+    ///
+    /// ```
+    /// use drystone::{ContactHooks, Reference, Simulation, SolverConfig, World};
+    ///
+    /// /// All pairs touch, and no contact changes.
+    /// struct Idle;
+    ///
+    /// impl ContactHooks for Idle {}
+    ///
+    /// let mut simulation = Simulation::new(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.set_hooks(Some(Box::new(Idle)));
+    /// simulation.step(1.0 / 60.0)?;
+    /// simulation.set_hooks(None);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn set_hooks(&mut self, hooks: Option<Box<dyn ContactHooks>>) {
+        self.unfinished = None;
+        self.hooks = hooks;
     }
 
     /// The events and sums that the simulation reports.
@@ -373,22 +400,20 @@ impl Simulation {
         if changes.all_rows() || self.stages.contacts.are_unsorted() {
             self.on_device = false;
         }
-        let Self { world, config, stages, on_device, .. } = self;
+        let Self { world, config, stages, on_device, hooks, .. } = self;
         let assembled = panics::caught(|| {
             stages.follow(world, config, dt, &changes);
             if stages.is_everything_still(world, stats) {
-                return false;
+                return Ok(false);
             }
-            if stages.find(world, config, dt, stats) {
+            if stages.find(world, config, dt, hooks.as_deref_mut(), stats)? {
                 *on_device = false;
             }
             stages.prepare(world, config, dt, *on_device, stats);
-            true
+            Ok(true)
         });
-        let is_assembled = assembled.map_err(|panic| {
-            self.begin_anew();
-            self.panicked(panic)
-        })?;
+        let assembled = assembled.unwrap_or_else(|panic| Err(self.panicked(panic)));
+        let is_assembled = assembled.inspect_err(|_| self.begin_anew())?;
         if is_assembled && self.stages.is_foreign {
             self.check_foreign()?;
         }
@@ -498,11 +523,11 @@ impl Simulation {
             let mut next = self.stages.clone();
             next.follow(&self.world, &self.config, dt, &changes);
             next.is_everything_still(&self.world, &mut StepStats::default());
-            next.find(&self.world, &self.config, dt, &mut StepStats::default());
+            next.find(&self.world, &self.config, dt, self.hooks.as_deref_mut(), &mut StepStats::default())?;
             next.prepare(&self.world, &self.config, dt, false, &mut StepStats::default());
-            (next.problem, next.plan)
+            Ok((next.problem, next.plan))
         });
-        assembled.map_err(|panic| self.panicked(panic))
+        assembled.unwrap_or_else(|panic| Err(self.panicked(panic)))
     }
 
     /// A view of the bodies at their present poses, for rays, shape casts, points and boxes. It uses the tree of the
@@ -612,6 +637,38 @@ impl Simulation {
     pub fn solved_penetration(&self) -> Penetration {
         let separations = |m: SolvedManifold| (0..m.points().len()).map(move |k| m.points()[k].separation);
         Penetration::of(self.manifolds().map(separations))
+    }
+
+    /// Force of a joint on its body b in the last step, in world axes (N). It is the mean over the step if the
+    /// simulation [listens](Self::listen), or if the world has a joint with a break force, a motor or a spring. Else,
+    /// and for sleeping bodies, it is the force of the last substep. `None` if the joint is gone, or took part in no
+    /// step since it was inserted or since the state was loaded.
+    ///
+    /// ```
+    /// use drystone::{Body, Joint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    ///
+    /// let mut world = World::new();
+    /// let wall = world.add(Body::fixed());
+    /// let beam = Body::dynamic().shape(Shape::cuboid(0.5, 0.05, 0.05)).total_mass(2.0);
+    /// let beam = world.add(beam.position(0.5, 0.0, 0.0));
+    /// let weld = world.insert_joint(Joint::new(wall, Vec3::ZERO, beam, Vec3::X * -0.5).fixed());
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// assert_eq!(simulation.joint_force(weld), None);
+    /// (0..120).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+    /// // The wall bears the weight of 2 kg at 0.5 m.
+    /// let [force, torque] = [simulation.joint_force(weld), simulation.joint_torque(weld)].map(Option::unwrap);
+    /// assert!((force - 19.62 * Vec3::Y).length() < 0.1, "{force} N");
+    /// assert!((torque - 9.81 * Vec3::Z).length() < 0.1, "{torque} N m");
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn joint_force(&self, joint: JointHandle) -> Option<glam::Vec3> {
+        self.stages.joint_load(&self.world, joint).map(|[force, _]| force)
+    }
+
+    /// Torque of a joint on its body b about the anchor on body a, in world axes (N m). It sums the locks, limits,
+    /// motors and springs of angles, over the same time as [`Self::joint_force`], and is `None` where that is.
+    pub fn joint_torque(&self, joint: JointHandle) -> Option<glam::Vec3> {
+        self.stages.joint_load(&self.world, joint).map(|[_, torque]| torque)
     }
 
     /// Impulse of each joint on its body b in the last substep ([`Self::substeps_of`]), in world axes (N s).

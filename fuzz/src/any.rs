@@ -218,7 +218,7 @@ impl AnyBody {
             body = body.velocity(linear.vec(), angular.vec());
         }
         if let Some((friction, restitution)) = self.material {
-            body.material = Material { friction: friction.0, restitution: restitution.0 };
+            body.material = Material { friction: friction.0, restitution: restitution.0, ..Material::default() };
         }
         if let Some(mass) = self.mass {
             body = mass.onto(body);

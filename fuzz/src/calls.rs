@@ -187,7 +187,8 @@ impl Game {
             }
             Call::Mass(k, mass) => self.change(*k, |body| *body = mass.onto(body.clone())),
             Call::Surface(k, friction, restitution) => {
-                self.change(*k, |body| body.material = Material { friction: friction.0, restitution: restitution.0 });
+                let material = Material { friction: friction.0, restitution: restitution.0, ..Material::default() };
+                self.change(*k, |body| body.material = material);
             }
             Call::Groups(k, membership, filter) => self.change(*k, |body| {
                 body.groups = drystone::Groups { membership: (*membership).into(), filter: (*filter).into() };

@@ -30,6 +30,8 @@ ON_REQUEST = {
     "mass_scale": 1,
     "joint_position": 6,
     "joint_speed": 6,
+    "joint_force": 3,
+    "joint_torque": 3,
     "joint_impulse": 3,
     "joint_torque_impulse": 3,
 }
@@ -463,6 +465,17 @@ class Batch:
     def joint_speed(self) -> Floats:
         """[W, J, 6] their speeds (m/s, rad/s); a new array."""
         return self._column("joint_speed")
+
+    @property
+    def joint_force(self) -> Floats:
+        """[W, J, 3] force on the second body in the last step (N): the mean over the step if any joint of the world has
+        a break force, a motor or a spring, else the force of the last substep; a new array."""
+        return self._column("joint_force")
+
+    @property
+    def joint_torque(self) -> Floats:
+        """[W, J, 3] torque on the second body about the anchor, over the same time (N m); a new array."""
+        return self._column("joint_torque")
 
     @property
     def joint_impulse(self) -> Floats:

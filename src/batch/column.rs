@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use super::Member;
 use crate::error::{Result, ensure, input};
 use crate::names::named;
-use crate::world::{Axis, Body, Drive, Joint, Linear, MassProperties, World};
+use crate::world::{Axis, Body, Drive, Joint, JointHandle, Linear, MassProperties, World};
 
 /// A kind of numbers of a world, with a row for each body, joint, drive or world. See [`Member::read`].
 ///
@@ -55,6 +55,10 @@ pub enum Column {
     JointPosition,
     /// Rates of the joint positions (m/s, rad/s).
     JointSpeed,
+    /// Force of each joint on its body b: [`Simulation::joint_force`](crate::Simulation::joint_force) (N).
+    JointForce,
+    /// Torque of each joint on its body b: [`Simulation::joint_torque`](crate::Simulation::joint_torque) (N m).
+    JointTorque,
     /// Impulse of each joint on its body b in the last substep (N s).
     JointImpulse,
     /// Angular impulse of each joint on its body b in the last substep (N m s).
@@ -75,6 +79,8 @@ named!(Column {
     Control = "ctrl",
     JointPosition = "joint_position",
     JointSpeed = "joint_speed",
+    JointForce = "joint_force",
+    JointTorque = "joint_torque",
     JointImpulse = "joint_impulse",
     JointTorqueImpulse = "joint_torque_impulse",
 });
@@ -95,9 +101,12 @@ impl Column {
         match self {
             Self::Gravity => 1,
             Self::Control => drives(world).count(),
-            Self::JointPosition | Self::JointSpeed | Self::JointImpulse | Self::JointTorqueImpulse => {
-                world.joints.len()
-            }
+            Self::JointPosition
+            | Self::JointSpeed
+            | Self::JointForce
+            | Self::JointTorque
+            | Self::JointImpulse
+            | Self::JointTorqueImpulse => world.joints.len(),
             _ => world.bodies.len(),
         }
     }
@@ -165,7 +174,7 @@ fn aim(drive: &mut Drive) -> Option<&mut f32> {
     match drive {
         Drive::None => None,
         Drive::Motor { speed, .. } => Some(speed),
-        Drive::Spring { target, .. } => Some(target),
+        Drive::Spring { target, .. } | Drive::SpringDamper { target, .. } => Some(target),
     }
 }
 
@@ -193,6 +202,14 @@ impl Member {
             Column::Control => put(rows, world.joints.iter().flat_map(aims).map(|aim| Some([aim]))),
             Column::JointPosition => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).position))),
             Column::JointSpeed => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).speed))),
+            Column::JointForce => {
+                let force = |&joint: &JointHandle| self.simulation().joint_force(joint);
+                put(rows, world.joints.handles().iter().map(|joint| force(joint).map(|v| v.to_array())));
+            }
+            Column::JointTorque => {
+                let torque = |&joint: &JointHandle| self.simulation().joint_torque(joint);
+                put(rows, world.joints.handles().iter().map(|joint| torque(joint).map(|v| v.to_array())));
+            }
             Column::JointImpulse => put(rows, self.simulation().joint_impulses().iter().map(|v| Some(v.to_array()))),
             Column::JointTorqueImpulse => {
                 put(rows, self.simulation().joint_angular_impulses().iter().map(|v| Some(v.to_array())));

@@ -6,7 +6,7 @@ use parry3d::math::Pose;
 use parry3d::shape::SharedShape;
 
 use crate::math::rotation::squared_length;
-use crate::world::{Body, BodyKind, Collider, Shape, placed};
+use crate::world::{Body, BodyKind, Collider, Material, Shape, placed};
 
 /// How a body takes part in the detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +40,8 @@ pub(super) struct ColliderInfo {
     pub unbounded: bool,
     /// Whether it is a sensor.
     pub sensor: bool,
+    /// Its own material.
+    pub material: Option<Material>,
 }
 
 /// The body index of a removed collider.
@@ -58,13 +60,13 @@ impl ColliderInfo {
             reach: c.position.length() + c.shape.bounding_radius(),
             unbounded: c.shape.is_half_space(),
             sensor: c.sensor,
+            material: c.material,
         }
     }
 
     /// A removed collider.
     pub fn gone() -> Self {
-        let (position, rotation) = (Vec3::ZERO, Quat::IDENTITY);
-        Self::new(NO_BODY, 0, &Collider { shape: Shape::ball(1.0), position, rotation, sensor: false })
+        Self::new(NO_BODY, 0, &Collider::new(Shape::ball(1.0)))
     }
 
     /// Marks the collider as removed.
@@ -88,7 +90,7 @@ impl ColliderInfo {
     /// Whether this entry still describes the collider of a body.
     pub fn is(&self, body: usize, collider: &Collider) -> bool {
         self.body as usize == body
-            && self.sensor == collider.sensor
+            && (self.sensor, self.material) == (collider.sensor, collider.material)
             && std::sync::Arc::ptr_eq(&self.shape.0, &collider.shape.0.0)
             && self.local == Pose::from_parts(collider.position, collider.rotation)
     }

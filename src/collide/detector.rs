@@ -4,9 +4,9 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::collider::Activity;
-use super::collider::{BodyState, Margins};
+use super::collider::{Activity, BodyState, ColliderInfo, Margins};
 use super::guard::Extent;
+use super::manifold::MAX_POINTS;
 use super::pair::Pair;
 use super::pairs::Placed;
 use super::places::Places;
@@ -18,6 +18,12 @@ use crate::config::SolverConfig;
 use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, BodyKind, Groups, Joint, World};
+
+/// A collider: its body, and its index on that body.
+pub(crate) type ColliderSide = (u32, u32);
+
+/// Whether two colliders may touch, the one of the body with the smaller index first.
+pub(crate) type PairFilter<'a> = dyn FnMut([ColliderSide; 2]) -> bool + 'a;
 
 /// Finds the contacts of one world or of several worlds beside each other, and keeps them from step to step.
 pub struct Detector {
@@ -39,9 +45,20 @@ pub struct Detector {
     pub(super) jointed: HashSet<(u32, u32)>,
     /// The result of the last call of [`Self::sense`].
     overlaps: Vec<Overlap>,
+    /// Colliders that pass through each other in this step.
+    pub(super) refused: HashSet<[ColliderSide; 2]>,
 }
 
-crate::saved::cloned!(Detector { worlds, known, kinds, groups, extents, left, jointed } scratch { moving, falls, overlaps });
+crate::saved::cloned!(Detector {
+    worlds,
+    known,
+    kinds,
+    groups,
+    extents,
+    left,
+    jointed,
+    refused,
+} scratch { moving, falls, overlaps });
 
 /// A body, as the detector knows it.
 #[derive(Clone, Copy, Default)]
@@ -56,7 +73,7 @@ crate::saved::fields!(KnownBody { generation, world, colliders });
 
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
 fn jointed(world: &World) -> HashSet<(u32, u32)> {
-    let apart = world.joints.iter().filter(|joint| !joint.collide);
+    let apart = world.joints.iter().filter(|joint| joint.enabled && !joint.collide);
     let ends = |joint: &Joint| (joint.body_a.index() as u32, joint.body_b.map(|b| b.index() as u32));
     apart.map(ends).filter_map(|(a, b)| Some(key(a, b?))).collect()
 }
@@ -151,6 +168,7 @@ impl Detector {
             falls: Vec::new(),
             jointed: jointed(world),
             overlaps: Vec::new(),
+            refused: HashSet::new(),
         };
         detector.follow_bodies(world, &(0..world.bodies.len()).collect::<Vec<_>>());
         detector
@@ -284,14 +302,43 @@ impl Detector {
         self.worlds[world as usize].pairs.computed_at(pair as usize)
     }
 
+    /// The places of the pairs that take part in the step and have manifolds, in the order of [`Self::pairs`].
+    pub(crate) fn taking_part(&self) -> Vec<[u32; 2]> {
+        let wanted = self.placed_pairs().filter(|(_, pair)| pair.takes_part && !pair.manifolds.is_empty());
+        wanted.map(|(place, _)| place).collect()
+    }
+
+    /// Keeps those points of the manifolds of a pair for which `kept` is true, until the next detection computes the
+    /// pair again. If no point is left, the colliders pass through each other. `is_reused`: the manifolds are those of
+    /// the step before.
+    pub(crate) fn drop_points(&mut self, [part, pair]: [u32; 2], kept: &[[bool; MAX_POINTS]], is_reused: bool) {
+        let Self { worlds, refused, .. } = self;
+        let own = worlds[part as usize].drop_points(pair, kept, is_reused);
+        if !own.is_touching() {
+            refused.insert(own.sides());
+        }
+    }
+
+    /// Whether two colliders pass through each other in this step.
+    pub(super) fn is_refused(&self, a: &ColliderInfo, b: &ColliderInfo) -> bool {
+        !self.refused.is_empty() && self.refused.contains(&in_order([a, b].map(|c| (c.body, c.index))))
+    }
+
     /// Updates the pairs to the poses of `world`, for a step of `dt` seconds. Reused manifolds stay unchanged, and
     /// their pairs keep the poses at which they were computed. Pairs without an active body stay unchanged and take no
-    /// part in the step. Without `activity`, all pairs take part.
-    pub fn detect(&mut self, world: &World, config: &SolverConfig, dt: f32, activity: &[Activity]) -> DetectStats {
+    /// part in the step. Without `activity`, all pairs take part. Pairs that `filter` refuses have no manifolds.
+    pub fn detect(
+        &mut self,
+        world: &World,
+        config: &SolverConfig,
+        dt: f32,
+        activity: &[Activity],
+        filter: Option<&mut PairFilter>,
+    ) -> DetectStats {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
         let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i), world.gravity_on(i));
         world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
-        for (a, b) in world.joints.iter().map(Joint::indices) {
+        for (a, b) in world.joints.iter().filter(|joint| joint.enabled).map(Joint::indices) {
             [Some(a), b].into_iter().flatten().for_each(|body| self.moving[body].tied = 1.0);
         }
         self.falls.clear();
@@ -316,7 +363,24 @@ impl Detector {
             activity,
             jointed: &self.jointed,
         };
-        let detected = self.worlds.par_iter_mut().zip(&self.falls).map(|(world, &fall)| world.detect(&input(fall)));
+        let worlds = self.worlds.par_iter_mut().zip(&self.falls);
+        if filter.is_none() && self.refused.is_empty() {
+            let detected = worlds.map(|(world, &fall)| world.detect(&input(fall)));
+            return detected.reduce(DetectStats::default, DetectStats::and);
+        }
+        let parted: Vec<bool> = worlds.map(|(world, &fall)| world.broad_phase(&input(fall))).collect();
+        self.refused.clear();
+        let (mut filter, moving) = (filter, &self.moving);
+        for part in &mut self.worlds {
+            part.filter(moving, filter.as_deref_mut(), &mut self.refused);
+        }
+        let worlds = self.worlds.par_iter_mut().zip(&self.falls).zip(parted);
+        let detected = worlds.map(|((world, &fall), parted)| world.narrow_phase(&input(fall), parted));
         detected.reduce(DetectStats::default, DetectStats::and)
     }
+}
+
+/// Two colliders, the one of the body with the smaller index first.
+pub(super) fn in_order([a, b]: [ColliderSide; 2]) -> [ColliderSide; 2] {
+    [a.min(b), a.max(b)]
 }

@@ -125,7 +125,8 @@ impl Detector {
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut islands = Islands::default();
         islands.reset(world.bodies.len());
-        for (a, b) in world.joints.iter().filter_map(|joint| Some((joint.indices().0, joint.indices().1?))) {
+        let tied = world.joints.iter().filter(|joint| joint.enabled);
+        for (a, b) in tied.filter_map(|joint| Some((joint.indices().0, joint.indices().1?))) {
             if is_dynamic(a) && is_dynamic(b) {
                 islands.join(a as u32, b as u32);
             }
@@ -191,6 +192,9 @@ impl Detector {
                 let is_pushed = self.kinds[other.body as usize] == BodyKind::Dynamic;
                 let is_met = is_fixed != moves && (!is_pushed || world.bodies[i as usize].swept);
                 if other.body == i || !is_met || !groups[0].meets(groups[1]) || self.jointed.contains(&pair) {
+                    return;
+                }
+                if self.is_refused(c, other) {
                     return;
                 }
                 let others = self.way_of(world, other.body, dt);

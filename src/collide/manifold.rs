@@ -103,6 +103,18 @@ impl Manifold {
         self.count = 0;
     }
 
+    /// Keeps the points for which `kept` is true. The points of a reused manifold have the impulses at their own
+    /// places.
+    pub(super) fn keep(&mut self, kept: &[bool; MAX_POINTS], is_reused: bool) {
+        let mut count = 0;
+        for k in (0..usize::from(self.count)).filter(|&k| kept[k]) {
+            let before = if is_reused { Some(k as u8) } else { self.points[k].before };
+            self.points[count] = ManifoldPoint { before, ..self.points[k] };
+            count += 1;
+        }
+        self.count = count as u8;
+    }
+
     /// Whether it has ended.
     pub(crate) fn has_ended(&self) -> bool {
         self.count == 0
@@ -271,6 +283,18 @@ mod tests {
         assert_eq!((new.slot, before(&new)), (NO_SLOT, vec![None]));
         new.succeed(&old, 0.01);
         assert_eq!((new.slot, before(&new)), (5, vec![Some(0)]));
+    }
+
+    #[test]
+    fn points_that_are_kept_know_where_their_impulses_are() {
+        let mut computed = Manifold::new(Vec3::Y, (0, 0), &octagon()[..4]);
+        computed.points[3].before = Some(1);
+        for (is_reused, expected) in [(false, [None, Some(1)]), (true, [Some(1), Some(3)])] {
+            let mut m = computed.clone();
+            m.keep(&[false, true, false, true], is_reused);
+            assert_eq!(before(&m), expected);
+            assert_eq!([0, 1].map(|k| m.points()[k].anchor_a), [1, 3].map(|k| computed.points()[k].anchor_a));
+        }
     }
 
     #[test]

@@ -36,6 +36,7 @@ mod world_contacts;
 
 pub use collider::Activity;
 pub use detector::Detector;
+pub(crate) use detector::{ColliderSide, PairFilter};
 pub use manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
 pub use pair::Pair;
 pub use pairs::Placed;

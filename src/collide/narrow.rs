@@ -87,7 +87,11 @@ impl Narrow<'_> {
                 let place = group * WIDTH + lane;
                 let (pair, track) = (&mut pairs[place], &mut tracks[place]);
                 let mut update = Some(Update::Reused);
-                if verdict == LOST {
+                if pair.is_refused {
+                    // The filter ended its manifolds.
+                    let had_contacts = !pair.manifolds.is_empty();
+                    update = Some(if had_contacts { Update::Reshaped } else { Update::Reused });
+                } else if verdict == LOST {
                     pair.end();
                     track.predicted = NEVER;
                     update = Some(Update::Reshaped);

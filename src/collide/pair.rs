@@ -6,9 +6,10 @@ use parry3d::query::TrackedContact;
 use parry3d::shape::TypedShape;
 
 use super::collider::{BodyState, ColliderInfo};
+use super::detector::{ColliderSide, in_order};
 use super::facet::composite_contacts;
 use super::flush::{FlushScratch, Neighbors};
-use super::manifold::{Manifold, ManifoldPoint, NO_SLOT};
+use super::manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, empty, flip};
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
 use crate::random::mixed;
@@ -31,8 +32,11 @@ pub struct Pair {
     pub size: f32,
     /// Whether one of its bodies is awake, so that the sweeps solve its manifolds.
     pub takes_part: bool,
-    /// Whether a shape that lies flush with one of the colliders changed its manifold.
+    /// Whether its manifolds do not follow from the two colliders: a shape that lies flush with one of them, or a hook,
+    /// changed them.
     pub(super) is_mended: bool,
+    /// Whether a hook lets the two colliders pass through each other.
+    pub(super) is_refused: bool,
 }
 
 crate::saved::cloned!(Pair {
@@ -44,7 +48,8 @@ crate::saved::cloned!(Pair {
     collider_b,
     size,
     takes_part,
-    is_mended
+    is_mended,
+    is_refused
 });
 
 /// A collider and the state of its body.
@@ -89,6 +94,7 @@ impl Pair {
             size: a.size.min(b.size),
             takes_part: true,
             is_mended: false,
+            is_refused: false,
         }
     }
 
@@ -100,6 +106,19 @@ impl Pair {
     pub fn rank(&self) -> u64 {
         let both = u64::from(self.collider_a) << 32 | u64::from(self.collider_b);
         mixed(both) >> 32 << 32
+    }
+
+    /// Its colliders, the one of the body with the smaller index first.
+    pub(super) fn sides(&self) -> [ColliderSide; 2] {
+        in_order([(self.body_a, self.colliders[0]), (self.body_b, self.colliders[1])])
+    }
+
+    /// Keeps those points of its manifolds for which `kept` is true.
+    pub(super) fn drop_points(&mut self, kept: &[[bool; MAX_POINTS]], is_reused: bool) {
+        for (manifold, kept) in self.manifolds.iter_mut().zip(kept) {
+            manifold.keep(kept, is_reused);
+        }
+        self.is_mended = true;
     }
 
     /// Whether the bodies touch or are about to touch.

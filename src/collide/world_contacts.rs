@@ -10,12 +10,14 @@ use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
 use rayon::prelude::*;
 
-use super::collider::Activity;
-use super::collider::{BodyState, ColliderInfo, CuboidPlace, Margins, is_in_range};
+use super::collider::{Activity, BodyState, ColliderInfo, CuboidPlace, Margins, is_in_range};
+use super::detector::{ColliderSide, PairFilter};
 use super::flush::Neighbors;
-use super::manifold::NO_SLOT;
+use super::manifold::{MAX_POINTS, NO_SLOT};
 use super::narrow::{Narrow, Updated};
+use super::pair::Pair;
 use super::pairs::Pairs;
+use super::path::ANEW;
 use super::places::{Place, Standing};
 use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
@@ -197,12 +199,45 @@ impl WorldContacts {
     /// Updates the pairs to the present poses.
     pub fn detect(&mut self, input: &DetectionInput) -> DetectStats {
         let parted = self.broad_phase(input);
-        let stats = self.narrow_phase(input);
-        DetectStats { reshaped: stats.reshaped | parted, ..stats }
+        self.narrow_phase(input, parted)
+    }
+
+    /// Asks `filter` for the pairs of a body that is awake or moves; the others keep their answers. Without a filter
+    /// all pairs may touch. Adds those that may not to `refused`.
+    pub fn filter(
+        &mut self,
+        moving: &[BodyState],
+        mut filter: Option<&mut PairFilter>,
+        refused: &mut HashSet<[ColliderSide; 2]>,
+    ) {
+        for i in 0..self.pairs.len() {
+            let pair = &self.pairs[i];
+            let is_active = [pair.body_a, pair.body_b].iter().any(|&body| moving[body as usize].activity > 0.0);
+            let sides = pair.sides();
+            let is_refused = match &mut filter {
+                Some(filter) if is_active => !filter(sides),
+                Some(_) => pair.is_refused,
+                None => false,
+            };
+            self.pairs[i].is_refused = is_refused;
+            if is_refused {
+                refused.insert(sides);
+                self.pairs.end(i);
+            }
+        }
+    }
+
+    /// Drops points of the manifolds of a pair. The next detection computes the pair again.
+    pub fn drop_points(&mut self, place: u32, kept: &[[bool; MAX_POINTS]], is_reused: bool) -> &Pair {
+        let (pair, track) = self.pairs.with_track_mut(place as usize);
+        pair.drop_points(kept, is_reused);
+        track.predicted = ANEW;
+        self.changed.push(PairChange { pair: place, computed: true });
+        pair
     }
 
     /// Finds new pairs and ends separated ones. Returns whether an ended pair had a contact.
-    fn broad_phase(&mut self, input: &DetectionInput) -> bool {
+    pub fn broad_phase(&mut self, input: &DetectionInput) -> bool {
         let look_again = std::mem::take(&mut self.look_again);
         if !self.fatten(input) && !look_again {
             return false;
@@ -336,12 +371,13 @@ impl WorldContacts {
         pairs.begin(found, colliders);
     }
 
-    fn narrow_phase(&mut self, input: &DetectionInput) -> DetectStats {
+    /// Updates the contacts of all pairs. `parted` tells whether an ended pair had a contact.
+    pub fn narrow_phase(&mut self, input: &DetectionInput, parted: bool) -> DetectStats {
         let Self { colliders, cuboids, tree, planes, pairs, changed, .. } = self;
         let neighbors = Neighbors { colliders, tree, planes, input };
         let narrow = Narrow { colliders, cuboids, moving: input.moving, margins: input.margins, neighbors };
         let updates: Vec<Updated> = pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
-        let mut stats = DetectStats { pairs: pairs.len(), ..DetectStats::default() };
+        let mut stats = DetectStats { pairs: pairs.len(), reshaped: parted, ..DetectStats::default() };
         for Updated { pair, computed, reshaped } in updates {
             stats.computed += usize::from(computed);
             stats.reshaped |= reshaped;

@@ -12,9 +12,11 @@
 
 use std::f32::consts::{PI, TAU};
 
-use super::NodeRow;
-use super::rows::{AxisRow, NO_LIMIT};
+use super::rows::{AxisRow, BodyRow, NO_LIMIT};
 use super::softness::softness;
+use super::{NodeRow, StepProblem};
+use crate::kernels::axis::{axis_inverse_mass, axis_motion};
+use crate::kernels::rows::{Axis as AxisOf, Body as BodyOf, Joint as JointOf, Mass, Pair};
 use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear, World};
 
 /// Springs that turn by more than this in a substep (rad) are integrated implicitly, which takes energy: several of them on one body would gain
@@ -64,6 +66,9 @@ pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
                 let stiffness = if is_angle { inertia } else { mass } * (TAU * frequency).powi(2);
                 max_load.min(stiffness * (position[i] - target).abs())
             }
+            Drive::SpringDamper { target, stiffness, max_load, .. } => {
+                max_load.min(stiffness * (position[i] - target).abs())
+            }
         };
         if is_angle { load / world.bodies[a].smallest_half_extent() } else { load }
     };
@@ -106,7 +111,7 @@ pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rat
         let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
         // An angle that passed pi goes on beyond: a turn less is no other place.
         let middle = match (is_drive, axis.drive, axis.bounds) {
-            (true, Drive::Spring { target, .. }, _) => target,
+            (true, Drive::Spring { target, .. } | Drive::SpringDamper { target, .. }, _) => target,
             (false, _, Bounds::Between { min, max }) => 0.5 * (min + max),
             _ => 0.0,
         };
@@ -150,7 +155,38 @@ fn driven(row: AxisRow, drive: Drive, position: f32, h: f32) -> AxisRow {
             let (gap, mass_scale) = (position - target, 1.0 - impulse_scale);
             AxisRow { gap, rate, mass_scale, impulse_scale, max_impulse: largest(max_load, h), ..row }
         }
+        // What it moves is known once all masses are: [`tune`].
+        Drive::SpringDamper { target, max_load, .. } => {
+            AxisRow { gap: position - target, impulse_scale: 1.0, max_impulse: largest(max_load, h), ..row }
+        }
         Drive::None => row,
+    }
+}
+
+/// Whether a joint has springs with constants of their own.
+pub(super) fn has_spring_dampers(joint: &Joint) -> bool {
+    axes_of(joint).any(|(_, axis)| matches!(axis.drive, Drive::SpringDamper { .. }))
+}
+
+/// Completes the rows of springs with constants of their own, for substeps of `substep` seconds: on what they move now,
+/// they are springs of the frequency √(k/m)/2π and the damping ratio c/2√(k m).
+pub(super) fn tune(joint: &Joint, number: usize, substep: f32, problem: &mut StepProblem) {
+    let row = &problem.joints[number];
+    let mass = |body: u32| Mass::load(&problem.masses[body as usize]);
+    let [a, b] = [BodyOf::<f32>::load(&BodyRow::AT_REST); 2];
+    let pair = Pair { a, b, mass_a: mass(row.body_a), mass_b: mass(row.body_b), ..Pair::default() };
+    let (anchors, first) = (JointOf::<f32>::load(row), row.first_axis as usize);
+    for (k, (i, _)) in (first..).zip(kinds(joint).filter(|(_, is_drive)| *is_drive)) {
+        let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
+        let Drive::SpringDamper { stiffness, damping, .. } = axis.drive else { continue };
+        let motion = axis_motion(&pair, &anchors, &AxisOf::<f32>::load(&problem.axes[k]));
+        let inverse_mass = axis_inverse_mass(&pair, &motion);
+        let omega = (stiffness * inverse_mass).sqrt();
+        if omega > 0.0 {
+            let [rate, impulse_scale] = spring(omega / TAU, 0.5 * damping * inverse_mass / omega, substep);
+            let row = &mut problem.axes[k];
+            (row.rate, row.mass_scale, row.impulse_scale) = (rate, 1.0 - impulse_scale, impulse_scale);
+        }
     }
 }
 

@@ -19,7 +19,7 @@ use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
 use crate::stats::HardestContact;
-use crate::world::{Body, BodyKind, Joint, World};
+use crate::world::{Body, BodyKind, Joint, Material, World};
 
 /// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
 #[derive(Debug, Default)]
@@ -47,6 +47,8 @@ pub struct ContactRows {
     materials: Option<Materials>,
     /// The bodies that lie still and touch nothing that they touched before.
     new_bodies: Vec<bool>,
+    /// The material that hooks gave to the contact of each slot; empty if they gave none.
+    hooked: Vec<Option<Material>>,
     /// Whether impulses are summed over the substeps of a step.
     pub sums: bool,
     /// How the rows follow from those of the step before.
@@ -61,6 +63,7 @@ crate::saved::cloned!(ContactRows {
     jams,
     classes,
     materials,
+    hooked,
     sums,
     carry,
 } scratch { graph, poses, struck, fast, jointed, new_bodies });
@@ -78,10 +81,10 @@ crate::saved::fields!(Materials { bounce, may_jam });
 
 impl Materials {
     fn of(world: &World) -> Self {
-        let any = |has: fn(&Body) -> bool| world.bodies.iter().any(has);
+        let any = |has: fn(Material) -> bool| world.bodies.iter().flat_map(Body::materials).any(has);
         Self {
-            bounce: any(|body| body.material.restitution > 0.0),
-            may_jam: any(|body| body.material.friction > LEAST_JAMMING),
+            bounce: any(|material| material.restitution > 0.0),
+            may_jam: any(|material| material.friction > LEAST_JAMMING),
         }
     }
 }
@@ -99,6 +102,43 @@ impl ContactRows {
     pub fn write_again(&mut self) {
         self.slots.write_again();
         self.materials = None;
+    }
+
+    /// Forgets the materials of contacts that ended.
+    pub fn begin_hooked(&mut self) {
+        for (hooked, slot) in self.hooked.iter_mut().zip(&self.slots.all) {
+            if slot.is_free() || slot.write == Write::New {
+                *hooked = None;
+            }
+        }
+    }
+
+    /// Sets the material that hooks give to the contact in a row, or that it has its own. Returns whether that changes
+    /// its rows.
+    pub fn set_hooked(&mut self, row: u32, material: Option<Material>) -> bool {
+        let row = row as usize;
+        if self.hooked.get(row).copied().flatten() == material {
+            return false;
+        }
+        self.hooked.resize(self.slots.all.len(), None);
+        self.hooked[row] = material;
+        let write = &mut self.slots.all[row].write;
+        *write = (*write).max(Write::Rows);
+        true
+    }
+
+    /// Gives all contacts their own materials. Returns whether that changes any rows.
+    pub fn forget_hooked(&mut self) -> bool {
+        self.begin_hooked();
+        let rows = 0..self.hooked.len() as u32;
+        let changed = rows.fold(false, |changed, row| self.set_hooked(row, None) | changed);
+        self.hooked.clear();
+        changed
+    }
+
+    /// Whether the manifold in a row is that of the step before.
+    pub fn is_reused(&self, row: u32) -> bool {
+        self.slots.all[row as usize].write < Write::Computed
     }
 
     /// Takes over bodies that came, went, or changed kind, groups or shapes.
@@ -163,6 +203,9 @@ impl ContactRows {
                 problem.totals = moved(&problem.totals, &from, stride);
             }
             problem.sags = moved(&problem.sags, &from, 1);
+            if !self.hooked.is_empty() {
+                self.hooked = moved(&self.hooked, &from, 1);
+            }
             self.computed = moved(&self.computed, &from, 1);
             self.jams = moved(&self.jams, &from, 1);
         }
@@ -248,6 +291,7 @@ impl ContactRows {
 
     fn may_jam(&self) -> bool {
         self.materials.is_some_and(|materials| materials.may_jam)
+            || self.hooked.iter().flatten().any(|material| material.friction > LEAST_JAMMING)
     }
 
     /// Whether the points of any contact are struck together.
@@ -349,7 +393,8 @@ impl ContactRows {
         problem.params.point_count = problem.points.len() as u32;
         problem.params.patches = patches.into();
         let materials = *self.materials.get_or_insert_with(|| Materials::of(world));
-        self.carry.approach = config.friction_rule() == FrictionRule::Slip || materials.bounce;
+        let hooked_bounces = self.hooked.iter().flatten().any(|material| material.restitution > 0.0);
+        self.carry.approach = config.friction_rule() == FrictionRule::Slip || materials.bounce || hooked_bounces;
         self.carry.tangents = matches!(config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
         let substep = Substep::new(config, dt / config.substeps as f32);
         self.carry.preload = Preload {
@@ -359,8 +404,9 @@ impl ContactRows {
             warm_start: config.warm_start.into(),
         };
         self.note_written(detector);
+        let may_jam = self.may_jam();
         let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
-        let Self { slots, carry, patches, computed, poses, jams, classes, .. } = self;
+        let Self { slots, carry, patches, computed, poses, jams, classes, hooked, .. } = self;
         let pose = |body: &Body| PoseRow {
             center: body.center_of_mass().to_array(),
             pad: 0.0,
@@ -385,7 +431,8 @@ impl ContactRows {
             carry,
             brings_impulses: true,
             patches: *patches,
-            may_jam: materials.may_jam,
+            hooked,
+            may_jam,
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);

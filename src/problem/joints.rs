@@ -25,6 +25,8 @@ pub struct JointRows {
     graph: ConstraintGraph,
     /// The coloring of all joints.
     pub coloring: Coloring,
+    /// Whether the step sums the impulses of all joints over its substeps.
+    pub sums: bool,
     is_colored: bool,
     /// The length of the substeps that each impulse belongs to, over that of class 0; 0 without an impulse.
     shares: Vec<f32>,
@@ -55,7 +57,7 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     left,
-} scratch { graph, gap_of_turns, lent });
+} scratch { graph, sums, gap_of_turns, lent });
 
 /// How much further a joint of a net that swings may open in the next step.
 const GROWTH: f32 = 2.5;
@@ -87,6 +89,19 @@ impl JointRows {
     /// Whether the rows are those of the joints of the world.
     pub fn are_of(&self, world: &World) -> bool {
         self.joints == *world.joints && self.handles == world.joints.handles()
+    }
+
+    /// The row of a joint in the last step.
+    pub fn row_of(&self, world: &World, joint: JointHandle) -> Option<usize> {
+        // Rows are in the order of the joints before the caller or the step removed some.
+        let now = world.joints.index(joint)?;
+        let is_here = |&row: &usize| self.handles.get(row) == Some(&joint);
+        Some(now).filter(is_here).or_else(|| self.handles.iter().position(|handle| *handle == joint))
+    }
+
+    /// The length of a substep of a joint in the last step, over that of class 0.
+    pub fn share(&self, row: usize) -> f32 {
+        self.shares[row]
     }
 
     /// Refuses rows that name bodies, joints or systems that are not there.
@@ -242,12 +257,15 @@ impl JointRows {
         self.chosen_for = None;
         self.edges = edges;
         let old = std::mem::take(&mut problem.joint_impulses);
-        let impulse = |from: &Option<usize>| from.and_then(|i| old.get(i).copied()).unwrap_or_default();
-        problem.joint_impulses = from.iter().map(impulse).collect();
+        // A joint that is off bears nothing.
+        let impulse = |(from, joint): (&Option<usize>, &Joint)| {
+            from.filter(|_| joint.enabled).and_then(|i| old.get(i).copied()).unwrap_or_default()
+        };
+        problem.joint_impulses = from.iter().zip(now.iter()).map(impulse).collect();
         // Impulses of axes follow if the joint has the same axes as before.
         let firsts: Vec<usize> = first_axes(&before).collect();
         for (joint, from) in now.iter().zip(&from) {
-            let same = from.filter(|&i| axes::kinds(&before[i]).eq(axes::kinds(joint)));
+            let same = from.filter(|&i| joint.enabled && axes::kinds(&before[i]).eq(axes::kinds(joint)));
             let axis = |k: usize| same.and_then(|i| old.get(before.len() + firsts[i] + k).copied()).unwrap_or_default();
             problem.joint_impulses.extend((0..axes::kinds(joint).count()).map(axis));
         }
@@ -379,7 +397,7 @@ impl JointRows {
             let (a, b) = joint.indices();
             joint.can_break() || joint.is_driven() || is_driven(a) || b.is_some_and(is_driven)
         };
-        if world.joints.iter().any(is_measured) {
+        if self.sums || world.joints.iter().any(is_measured) {
             // A joint that takes no part bears nothing that could break it.
             problem.joint_totals.resize(problem.joint_impulses.len(), JointImpulseRow::default());
         }
@@ -396,6 +414,9 @@ impl JointRows {
                 problem.torques.push(TorqueRow::NONE);
             }
             problem.params.body_count += 1;
+        }
+        for (i, joint) in world.joints.iter().enumerate().filter(|(_, joint)| axes::has_spring_dampers(joint)) {
+            axes::tune(joint, i, substep * self.shares[i], problem);
         }
     }
 }

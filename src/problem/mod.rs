@@ -97,7 +97,7 @@ pub struct StepProblem {
     pub axes: Vec<AxisRow>,
     /// Impulses of the joints, then of the axes.
     pub joint_impulses: Vec<JointImpulseRow>,
-    /// Their sums over the substeps of the step; empty where no joint can break.
+    /// Their sums over the substeps of the step; empty where nobody asks for them.
     pub joint_totals: Vec<JointImpulseRow>,
     /// The rows that passes go over, color by color: the contacts and the joints that take part, the bodies, the rows of unequal
     /// moments of inertia, the systems of joints that take part, and the rows of turning inertia.

@@ -20,7 +20,7 @@ use crate::config::{FrictionRule, SolverConfig};
 use crate::effort::Effort;
 use crate::lanes::{InstructionSet, Shared, WIDTH};
 use crate::math::{self, dot3, reciprocal};
-use crate::world::World;
+use crate::world::{Body, Material, World};
 
 /// The sources of the rows of contacts.
 pub(super) struct Writer<'a> {
@@ -41,6 +41,8 @@ pub(super) struct Writer<'a> {
     pub brings_impulses: bool,
     /// Whether a patch follows the points of every contact.
     pub patches: bool,
+    /// The materials that hooks gave to contacts, by slot; empty if they gave none.
+    pub hooked: &'a [Option<Material>],
     /// Whether a surface has so much friction that contacts may jam.
     pub may_jam: bool,
 }
@@ -134,7 +136,7 @@ impl Writer<'_> {
         for &i in written.all() {
             let (slot, i) = (&slots[i as usize], i as usize);
             rows.contacts[i].first_point = ((first + i) * stride) as u32;
-            self.write_slot(slot, i, rows);
+            self.write_slot(slot, (first + i, i), rows);
         }
         let what = What::Masses { tangents: self.carry.tangents, jams: self.may_jam };
         self.prepare(rows, written.all(), what);
@@ -167,13 +169,13 @@ impl Writer<'_> {
     }
 
     /// Writes all of a slot that does not follow from numbers of other rows.
-    fn write_slot(&self, slot: &Slot, i: usize, rows: &mut SlotRows) {
+    fn write_slot(&self, slot: &Slot, (number, i): (usize, usize), rows: &mut SlotRows) {
         let stride = points_a_slot(self.patches);
         let contact = &mut rows.contacts[i];
         let pair = self.detector.pair(slot.world, slot.pair);
         let manifold = &pair.manifolds[slot.manifold as usize];
         let before = *contact;
-        self.write_header(contact, slot, pair, manifold);
+        self.write_header(contact, (number, slot), pair, manifold);
         rows.computed[i] = self
             .detector
             .computed_at(slot.world, slot.pair)
@@ -201,9 +203,10 @@ impl Writer<'_> {
         }
     }
 
-    fn write_header(&self, row: &mut ContactRow, slot: &Slot, pair: &Pair, manifold: &Manifold) {
-        let [a, b] = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
-        let material = a.material.combine(b.material);
+    fn write_header(&self, row: &mut ContactRow, (number, slot): (usize, &Slot), pair: &Pair, manifold: &Manifold) {
+        let bodies = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
+        let hooked = self.hooked.get(number).copied().flatten();
+        let material = hooked.unwrap_or_else(|| Body::contact_material(bodies, pair.colliders));
         *row = ContactRow {
             friction: if self.config.friction_rule() == FrictionRule::None { 0.0 } else { material.friction },
             restitution: material.restitution,

@@ -11,8 +11,8 @@ mod spawners;
 pub use catalogue::{CATALOGUE, Entry, Family, Law, Member, Parameter};
 #[cfg(feature = "serde")]
 pub use file::{
-    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile,
-    SceneFile, ShapeFile, SpawnerFile, SpringFile, load, schema,
+    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile,
+    MaterialFile, MotorFile, SceneFile, ShapeFile, SpawnerFile, SpringFile, load, schema,
 };
 pub use scene::{Group, Scene};
 pub use spawner::{Leaves, Spawner};

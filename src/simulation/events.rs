@@ -10,7 +10,7 @@ use crate::world::{BodyHandle, JointHandle};
 /// costs nothing.
 ///
 /// Each of the three options makes a step sum impulses over its substeps, so that
-/// [`SolvedPoint::summed`](crate::SolvedPoint::summed) is available.
+/// [`SolvedPoint::summed`](crate::SolvedPoint::summed) is available, and forces of joints are means over the step.
 ///
 /// ```
 /// use drystone::{Listen, Reference, Simulation, SolverConfig, World};

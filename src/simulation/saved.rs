@@ -47,7 +47,7 @@ impl Snapshot {
 /// The first bytes of a saved run.
 const MAGIC: [u8; 8] = *b"drystone";
 /// The format version. It grows with every change of the format.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// Size of the header (bytes): the magic, the version, and the hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 
@@ -185,7 +185,8 @@ impl Simulation {
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, state: _, is_pending: _ } = self;
+        let Self { world, config, backend: _, stages, on_device: _, unfinished: _, state: _, is_pending: _, hooks: _ } =
+            self;
         world.walk(archive)?;
         config.walk(archive)?;
         if A::READS {

@@ -1,22 +1,27 @@
 //! All state that lasts from step to step, except the copy on a device. It has the stages of a step before and after
 //! the backend.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::by_body::ByBody;
 use super::events::{ColliderOf, Event, Events, Hit, Met};
-use crate::collide::{DetectStats, Detector};
+use super::hooks::ContactHooks;
+use crate::collide::{Activity, ColliderSide, DetectStats, Detector, PairFilter};
 use crate::config::SolverConfig;
 use crate::effort::Effort;
 use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
+use crate::panics::blaming;
 use crate::plan::{PlanKey, StepPlan};
-use crate::problem::{self, Approach, ColliderPair, ContactRows, ContactSummary, JointRows, StepProblem, StepScale};
+use crate::problem::{
+    self, Approach, ColliderPair, ContactRows, ContactSummary, JointRow, JointRows, StepProblem, StepScale,
+};
 use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
 use crate::stats::{StepStats, timed};
-use crate::world::{Body, BodyKind, Surface, World};
+use crate::world::{Body, BodyKind, JointHandle, Surface, World};
 
 /// Everything that a step passes to the next one, except the data on a device.
 pub(super) struct Stages {
@@ -278,10 +283,21 @@ impl Stages {
         self.sleep.is_everything_still()
     }
 
-    /// Detects contacts, colors them, and chooses the substep level of each island. Returns true if the rows on a
-    /// device no longer fit: an island has another level, or a body rests where it touched nothing before.
-    pub fn find(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
-        let Self { detector, sleep, effort, energy, contacts, joints, problem, found, by_body, .. } = self;
+    /// Detects contacts, lets hooks change them, colors them, and chooses the substep level of each island. Returns
+    /// true if the rows on a device no longer fit: an island has another level, a body rests where it touched nothing
+    /// before, or a contact has another material.
+    ///
+    /// # Errors
+    /// A hook sets a material that is out of range.
+    pub fn find(
+        &mut self,
+        world: &World,
+        config: &SolverConfig,
+        dt: f32,
+        mut hooks: Option<&mut (dyn ContactHooks + 'static)>,
+        stats: &mut StepStats,
+    ) -> Result<bool> {
+        let Self { detector, sleep, problem, contacts, found, by_body, .. } = self;
         // Rows can change places. A step that fails makes no new lists.
         by_body.forget();
         let times = &mut stats.times;
@@ -289,19 +305,35 @@ impl Stages {
         let are_sorted_anew = contacts.are_unsorted() || problem.contacts.is_empty();
         *found = timed(&mut times.detect, || {
             detector.end_teleported(world);
-            let mut found = detector.detect(world, config, dt, sleep.activity());
+            let mut detect = |detector: &mut Detector, activity: &[Activity]| {
+                let mut may_touch = hooks.as_deref_mut().map(|hooks| {
+                    move |sides: [ColliderSide; 2]| {
+                        let [a, b] = sides.map(|side| collider_of(world, side));
+                        blaming(sides.map(|side| side.0), || hooks.may_touch(world, a, b))
+                    }
+                });
+                let filter = may_touch.as_mut().map(|filter| filter as &mut PairFilter);
+                detector.detect(world, config, dt, activity, filter)
+            };
+            let mut found = detect(detector, sleep.activity());
             contacts.follow(world, detector);
             // A body that wakes takes part in this step.
             while sleep.wake_touched(world, detector) {
                 let before = found;
-                found = detector.detect(world, config, dt, sleep.activity());
+                found = detect(detector, sleep.activity());
                 contacts.follow(world, detector);
                 found.computed += before.computed;
                 found.reshaped |= before.reshaped;
             }
             found
         });
-        timed(&mut times.color, || {
+        let modified = self.modify_contacts(world, hooks)?;
+        if modified.materials {
+            self.plan_key = None;
+        }
+        let Self { detector, sleep, effort, energy, contacts, joints, problem, found, .. } = self;
+        found.reshaped |= modified.points;
+        let changes_class = timed(&mut times.color, || {
             if found.reshaped || are_sorted_anew || self.plan_key.is_none() {
                 contacts.color(world, config.max_colors);
                 energy.follow_contacts();
@@ -319,7 +351,8 @@ impl Stages {
             let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));
             let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above(world);
             effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
-        })
+        });
+        Ok(changes_class || modified.materials)
     }
 
     /// Prepares and plans the step. With `on_device`, the device continues from its own rows.
@@ -332,6 +365,7 @@ impl Stages {
             let drives = |body: &Body| body.kind != BodyKind::Dynamic && body.is_driven();
             contacts.sums = events.listen.sums() || world.bodies.iter().any(drives);
             contacts.write(world, detector, config, effort, dt, problem);
+            joints.sums = events.listen.sums();
             effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
@@ -384,6 +418,22 @@ impl Stages {
             }));
             events.note_hits(met);
         }
+    }
+
+    /// Force (N) of a joint on its body b in the last step, and torque about the anchor (N m), in world axes.
+    pub fn joint_load(&self, world: &World, joint: JointHandle) -> Option<[Vec3; 2]> {
+        let Self { joints, problem, sleep, key, .. } = self;
+        let row = joints.row_of(world, joint)?;
+        // A loaded state has no rows before its next step.
+        let JointRow { body_a, body_b, .. } = *problem.joints.get(row)?;
+        let step = key.scale?.step(key.config.substeps);
+        let sleeps = |body: u32| sleep.asleep().get(body as usize) == Some(&true);
+        // A step leaves the sums of sleeping joints at 0.
+        let (impulses, time) = match problem.joint_totals.is_empty() || sleeps(body_a) || sleeps(body_b) {
+            true => (&problem.joint_impulses, step / key.config.substeps as f32 * joints.share(row)),
+            false => (&problem.joint_totals, step),
+        };
+        Some([problem.joint_impulse(impulses, row), problem.axis_impulse(impulses, row, false)].map(|j| j / time))
     }
 
     /// Removes the joints that carried more than their break force in the step.

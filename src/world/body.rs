@@ -37,15 +37,58 @@ pub enum BodyKind {
 
 crate::saved::kinds!(BodyKind { Fixed, Kinematic, Dynamic });
 
-/// Friction and restitution of a surface.
+/// How a contact combines a coefficient of its two materials. If both materials have a rule, the later one in this list
+/// counts.
 ///
-/// A contact combines two materials: friction by the geometric mean, sqrt(a b), and restitution by the larger value.
+/// ```
+/// use drystone::{CombineRule, Material};
+///
+/// let of = |friction, friction_rule| Material { friction, friction_rule, ..Material::default() };
+/// let (ice, wood) = (of(0.1, Some(CombineRule::Minimum)), of(0.4, Some(CombineRule::Average)));
+/// assert_eq!((ice.combine(wood).friction, wood.combine(of(0.8, None)).friction), (0.1, 0.6));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize, serde::Serialize, schemars::JsonSchema),
+    serde(rename_all = "snake_case")
+)]
+#[non_exhaustive]
+pub enum CombineRule {
+    /// (a + b)/2.
+    Average,
+    /// sqrt(a b).
+    GeometricMean,
+    /// The smaller value.
+    Minimum,
+    /// a b.
+    Multiply,
+    /// The larger value.
+    Maximum,
+}
+
+crate::saved::kinds!(CombineRule { Average, GeometricMean, Minimum, Multiply, Maximum });
+
+impl CombineRule {
+    fn of(self, a: f32, b: f32) -> f32 {
+        match self {
+            Self::Average => 0.5 * (a + b),
+            Self::GeometricMean => (a * b).sqrt(),
+            Self::Minimum => a.min(b),
+            Self::Multiply => a * b,
+            Self::Maximum => a.max(b),
+        }
+    }
+}
+
+/// Friction and restitution of a surface, of a body or of one of its shapes ([`Collider::material`]).
 ///
 /// ```
 /// use drystone::Material;
 ///
-/// let (ice, rubber) = (Material { friction: 0.01, restitution: 0.0 }, Material { friction: 1.0, restitution: 0.8 });
-/// assert_eq!(ice.combine(rubber), Material { friction: 0.1, restitution: 0.8 });
+/// let of = |friction, restitution| Material { friction, restitution, ..Material::default() };
+/// let (ice, rubber) = (of(0.01, 0.0), of(1.0, 0.8));
+/// assert_eq!(ice.combine(rubber), of(0.1, 0.8));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
@@ -53,20 +96,39 @@ pub struct Material {
     pub friction: f32,
     /// Ratio of separation to approach velocity, 0 to 1.
     pub restitution: f32,
+    /// How contacts combine friction: by the geometric mean if neither material has a rule. `None` by default.
+    pub friction_rule: Option<CombineRule>,
+    /// How contacts combine restitution: by the larger value if neither material has a rule. `None` by default.
+    pub restitution_rule: Option<CombineRule>,
 }
 
-crate::saved::fields!(Material { friction, restitution });
+crate::saved::fields!(Material { friction, restitution, friction_rule, restitution_rule });
 
 impl Default for Material {
     fn default() -> Self {
-        Self { friction: 0.5, restitution: 0.0 }
+        Self { friction: 0.5, restitution: 0.0, friction_rule: None, restitution_rule: None }
     }
 }
 
 impl Material {
-    /// The material of a contact between `self` and `other`.
+    /// Refuses a coefficient that is out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self { friction, restitution, .. } = *self;
+        let is_friction = friction >= 0.0 && friction.is_finite();
+        ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
+        ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))
+    }
+
+    /// The material of a contact between `self` and `other`. It has no rules.
     pub fn combine(self, other: Self) -> Self {
-        Self { friction: (self.friction * other.friction).sqrt(), restitution: self.restitution.max(other.restitution) }
+        let friction = self.friction_rule.max(other.friction_rule).unwrap_or(CombineRule::GeometricMean);
+        let restitution = self.restitution_rule.max(other.restitution_rule).unwrap_or(CombineRule::Maximum);
+        Self {
+            friction: friction.of(self.friction, other.friction),
+            restitution: restitution.of(self.restitution, other.restitution),
+            friction_rule: None,
+            restitution_rule: None,
+        }
     }
 }
 
@@ -94,13 +156,35 @@ pub struct Collider {
     /// Whether the shape is a sensor. A sensor detects other colliders, pushes none of them, and has no mass. See
     /// [`Body::sensor`].
     pub sensor: bool,
+    /// Friction and restitution of this shape, in place of those of the body; `None` by default. Contacts of the body
+    /// end when it changes, as when a shape changes.
+    pub material: Option<Material>,
 }
 
-crate::saved::fields!(Collider { shape, position, rotation, sensor });
+crate::saved::fields!(Collider { shape, position, rotation, sensor, material });
 
 impl Collider {
-    /// Refuses a shape or a pose that no body can have.
+    /// A shape at the origin of a body, with the material of the body.
+    ///
+    /// ```
+    /// use drystone::{Body, Material, Shape, glam::Vec3, world::Collider};
+    ///
+    /// // A sled whose runners slide well, and whose seat does not.
+    /// let ice = Some(Material { friction: 0.05, ..Material::default() });
+    /// let runner = |z: f32| {
+    ///     let shape = Shape::cuboid(0.5, 0.02, 0.02);
+    ///     Collider { position: Vec3::new(0.0, -0.1, z), material: ice, ..Collider::new(shape) }
+    /// };
+    /// let sled = Body::dynamic().shape(Shape::cuboid(0.4, 0.05, 0.2)).collider(runner(-0.2)).collider(runner(0.2));
+    /// assert_eq!((sled.material.friction, sled.colliders[1].material), (0.5, ice));
+    /// ```
+    pub fn new(shape: Shape) -> Self {
+        Self { shape, position: Vec3::ZERO, rotation: Quat::IDENTITY, sensor: false, material: None }
+    }
+
+    /// Refuses a shape, a pose or a material that no body can have.
     pub(crate) fn check(&self) -> Result<()> {
+        self.material.as_ref().map_or(Ok(()), Material::check)?;
         self.shape.check()?;
         check_place("position", self.position)?;
         check_rotation("rotation", self.rotation)
@@ -186,7 +270,7 @@ pub struct Body {
     /// [`Self::kind`] does not change them: call [`Self::update_mass`]. A simulation raises a moment of inertia that is
     /// less than 1/32 of the mass times the squared lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
     pub mass: MassProperties,
-    /// Friction and restitution of the surface.
+    /// Friction and restitution of the shapes that have no own [`Collider::material`].
     pub material: Material,
     /// Which bodies this body collides with.
     pub groups: Groups,
@@ -389,9 +473,17 @@ impl Body {
     }
 
     /// Adds a shape at a pose in the body's frame.
-    pub fn shape_at(mut self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
-        self.colliders.push(Collider { shape, position, rotation, sensor: false });
-        self.update_mass();
+    pub fn shape_at(self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
+        self.collider(Collider { position, rotation, ..Collider::new(shape) })
+    }
+
+    /// Adds a shape with its pose and material, and its mass unless it is a sensor.
+    pub fn collider(mut self, collider: Collider) -> Self {
+        let has_mass = !collider.sensor;
+        self.colliders.push(collider);
+        if has_mass {
+            self.update_mass();
+        }
         self
     }
 
@@ -426,9 +518,8 @@ impl Body {
     }
 
     /// Adds a sensor at a pose in the body's frame.
-    pub fn sensor_at(mut self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
-        self.colliders.push(Collider { shape, position, rotation, sensor: true });
-        self
+    pub fn sensor_at(self, shape: Shape, position: Vec3, rotation: Quat) -> Self {
+        self.collider(Collider { position, rotation, sensor: true, ..Collider::new(shape) })
     }
 
     /// The colliders that are not sensors.
@@ -560,6 +651,12 @@ impl Body {
         self
     }
 
+    /// Sets friction, restitution, and how contacts combine them, for the shapes without own material.
+    pub fn material(mut self, material: Material) -> Self {
+        self.material = material;
+        self
+    }
+
     /// Sets the Coulomb friction coefficient, 0 or more.
     pub fn friction(mut self, friction: f32) -> Self {
         self.material.friction = friction;
@@ -683,8 +780,9 @@ impl Body {
     /// Whether another body shares the same shapes at the same poses. Equal copies of a shape do not count.
     pub(super) fn has_same_colliders(&self, other: &Self) -> bool {
         let same = |(a, b): (&Collider, &Collider)| {
-            let Collider { shape, position, rotation, sensor } = a;
-            shape.is(&b.shape) && (position, rotation, sensor) == (&b.position, &b.rotation, &b.sensor)
+            let Collider { shape, position, rotation, sensor, material } = a;
+            shape.is(&b.shape)
+                && (position, rotation, sensor, material) == (&b.position, &b.rotation, &b.sensor, &b.material)
         };
         self.colliders.len() == other.colliders.len() && self.colliders.iter().zip(&other.colliders).all(same)
     }
@@ -711,6 +809,21 @@ impl Body {
         }
         let [x, y, z] = self.locked_rotations;
         Vec3::select(glam::BVec3::new(x, y, z), Vec3::ZERO, spin)
+    }
+
+    /// The material of the contact of two bodies, at colliders of these indices.
+    pub(crate) fn contact_material([a, b]: [&Self; 2], colliders: [u32; 2]) -> Material {
+        a.material_of(colliders[0]).combine(b.material_of(colliders[1]))
+    }
+
+    /// The material of a collider.
+    fn material_of(&self, collider: u32) -> Material {
+        self.colliders.get(collider as usize).and_then(|c| c.material).unwrap_or(self.material)
+    }
+
+    /// The materials of the body and of its colliders.
+    pub(crate) fn materials(&self) -> impl Iterator<Item = Material> + '_ {
+        std::iter::once(self.material).chain(self.colliders.iter().filter_map(|c| c.material))
     }
 
     /// The properties for which its rows are written, in addition to its shapes.
@@ -933,10 +1046,7 @@ impl Body {
 
     /// Refuses a mass or a material that cannot be simulated.
     pub(super) fn check_surface(&self) -> Result<()> {
-        let Material { friction, restitution } = self.material;
-        let is_friction = friction >= 0.0 && friction.is_finite();
-        ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
-        ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))?;
+        self.material.check()?;
         self.additional.check_additional().map_err(|e| e.within("additional_mass"))?;
         if self.kind == BodyKind::Dynamic { self.check_mass() } else { self.mass.check_frame() }
     }

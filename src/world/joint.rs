@@ -39,6 +39,7 @@ use crate::saved::{Archive, Saved};
 /// let door = ball.hinge(Vec3::Y).limited(0.0, 1.5).spring(0.0, 1.0, 0.7).breaking_at(500.0).colliding();
 /// assert!(door.holds_anchors() && !door.is_ball() && door.collide);
 /// let piston = ball.slider(Vec3::Y).motor(0.5, 100.0);
+/// let barrier = ball.hinge(Vec3::Z).spring_damper(1.5, 40.0, 5.0);
 /// let weld = ball.fixed();
 /// let [rope, rod, spring] = [ball.rope(2.0), ball.rod(2.0), ball.elastic(2.0, 1.5, 0.1)];
 /// assert_eq!(rope.linear, Linear::Distance(Axis::limited(0.0, 2.0)));
@@ -50,7 +51,7 @@ use crate::saved::{Archive, Saved};
 /// let bolt = bolt.zero_at(Quat::from_rotation_z(1.5), Quat::IDENTITY);
 /// assert!(bolt.clone().first_axis().is_some() && weld.clone().first_axis().is_none());
 /// assert_eq!(Joint::to_world(0, anchors.0, Vec3::Y).body_b, None);
-/// # let _ = piston;
+/// # let _ = (piston, barrier);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
@@ -74,6 +75,8 @@ pub struct Joint {
     pub angular: [Axis; 3],
     /// Whether the two bodies still collide with each other.
     pub collide: bool,
+    /// Whether the joint acts; true by default. While it does not, its bodies move and collide as without it.
+    pub enabled: bool,
     /// The force at which the joint breaks (N), above 0; infinite for a joint that never breaks. A joint breaks after a
     /// step in which it carried more force. That force is the length of the sum of its impulses over all substeps,
     /// divided by the length of the step. A blow of J (N s) within a step of length h counts as J/h, with any number of
@@ -128,6 +131,7 @@ crate::saved::fields!(Joint {
     linear,
     angular,
     collide,
+    enabled,
     break_force,
 });
 
@@ -156,6 +160,7 @@ impl Joint {
             linear: Linear::Axes([Axis::LOCKED; 3]),
             angular: [Axis::FREE; 3],
             collide: false,
+            enabled: true,
             break_force: f32::INFINITY,
         }
     }
@@ -257,6 +262,13 @@ impl Joint {
         self
     }
 
+    /// Adds a spring and a damper to the first axis that is not locked, or to the distance: see
+    /// [`Axis::spring_damper`].
+    pub fn spring_damper(mut self, target: f32, stiffness: f32, damping: f32) -> Self {
+        self.on_first(|axis| axis.spring_damper(target, stiffness, damping, f32::MAX));
+        self
+    }
+
     /// The first axis that is not locked, or the distance. Translations come before rotations. Returns `None` for a
     /// fixed joint.
     pub fn first_axis(&mut self) -> Option<&mut Axis> {
@@ -284,9 +296,9 @@ impl Joint {
         }
     }
 
-    /// Whether the joint leaves all six axes free and only keeps its bodies from colliding.
+    /// Whether the joint is off, or leaves all six axes free and only keeps its bodies from colliding.
     pub(crate) fn holds_nothing(&self) -> bool {
-        self.linear_axes().iter().chain(&self.angular).all(|axis| *axis == Axis::FREE)
+        !self.enabled || self.linear_axes().iter().chain(&self.angular).all(|axis| *axis == Axis::FREE)
     }
 
     /// Whether the joint keeps the anchors together.
@@ -324,6 +336,28 @@ impl Joint {
     /// Whether a finite force breaks the joint.
     pub(crate) fn can_break(&self) -> bool {
         self.break_force < f32::INFINITY
+    }
+
+    /// Switches the joint on or off: [`Self::enabled`].
+    ///
+    /// ```
+    /// use drystone::{Body, Joint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    ///
+    /// let mut world = World::new();
+    /// let lamp = world.add(Body::dynamic().shape(Shape::ball(0.1)));
+    /// let hook = world.insert_joint(Joint::to_world(lamp, Vec3::ZERO, Vec3::ZERO).enabled(false));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// simulation.step(0.1)?;
+    /// assert!(simulation.world.bodies[lamp].position.y < -0.04);
+    /// let at = simulation.world.bodies[lamp].position;
+    /// let joint = simulation.world.joints.index(hook).expect("it is there");
+    /// (simulation.world.joints[joint].enabled, simulation.world.joints[joint].anchor_b) = (true, at);
+    /// simulation.step(0.1)?;
+    /// assert!(simulation.world.bodies[lamp].position.distance(at) < 1e-3);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn enabled(self, enabled: bool) -> Self {
+        Self { enabled, ..self }
     }
 
     /// Lets the two bodies collide with each other.

@@ -79,6 +79,17 @@ pub enum Drive {
         /// The largest total force or torque of spring and damper (N, N m).
         max_load: f32,
     },
+    /// A spring and damper with constants of their own, whatever mass they move.
+    SpringDamper {
+        /// The rest position (m, rad).
+        target: f32,
+        /// Force by distance, or torque by angle, above 0 (N/m, N m/rad).
+        stiffness: f32,
+        /// Force by speed, or torque by angular speed, 0 or more (N s/m, N m s/rad).
+        damping: f32,
+        /// The largest total force or torque of spring and damper (N, N m).
+        max_load: f32,
+    },
 }
 
 impl Axis {
@@ -102,6 +113,29 @@ impl Axis {
     /// the shorter way around.
     pub const fn spring(self, target: f32, frequency: f32, damping_ratio: f32, max_load: f32) -> Self {
         Self { drive: Drive::Spring { target, frequency, damping_ratio, max_load }, ..self }
+    }
+}
+
+impl Axis {
+    /// Adds a spring of `stiffness` (N/m, N m/rad) and a damper of `damping` (N s/m, N m s/rad) that pull to `target`
+    /// (m, rad) with up to `max_load` (N, N m): [`Drive::SpringDamper`].
+    ///
+    /// ```
+    /// use drystone::{Axis, Body, Joint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
+    ///
+    /// // 2 kg on a spring of 400 N/m: it stretches by 2 g/400.
+    /// let mut world = World::new();
+    /// let lamp = world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0));
+    /// assert_eq!(Axis::FREE.spring_damper(0.0, 400.0, 40.0, f32::MAX).bounds, Axis::FREE.bounds);
+    /// let slider = Joint::to_world(lamp, Vec3::ZERO, Vec3::ZERO).slider(Vec3::Y);
+    /// world.join(slider.spring_damper(0.0, 400.0, 40.0));
+    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// (0..180).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+    /// assert!((simulation.world.bodies[lamp].position.y + 0.04905).abs() < 1e-3);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub const fn spring_damper(self, target: f32, stiffness: f32, damping: f32, max_load: f32) -> Self {
+        Self { drive: Drive::SpringDamper { target, stiffness, damping, max_load }, ..self }
     }
 }
 
@@ -146,6 +180,7 @@ impl Saved for Drive {
             Self::Spring { target, frequency, damping_ratio, max_load } => {
                 (2, [target, frequency, damping_ratio, max_load])
             }
+            Self::SpringDamper { target, stiffness, damping, max_load } => (3, [target, stiffness, damping, max_load]),
         };
         kind.walk(archive)?;
         if kind > 0 {
@@ -156,6 +191,7 @@ impl Saved for Drive {
             0 => Self::None,
             1 => Self::Motor { speed: a, max_load: b },
             2 => Self::Spring { target: a, frequency: b, damping_ratio: c, max_load: d },
+            3 => Self::SpringDamper { target: a, stiffness: b, damping: c, max_load: d },
             _ => return Err(input!("unknown kind of drive: {kind}")),
         };
         Ok(())

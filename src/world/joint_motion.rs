@@ -190,6 +190,15 @@ impl Axis {
                 ensure((0.0..=1e6).contains(&damping_ratio), message)?;
                 max_load
             }
+            Drive::SpringDamper { target, stiffness, damping, max_load } => {
+                let message = || format!("{name}: target = {target}: must be within {least} and {most}");
+                ensure((least..=most).contains(&target), message)?;
+                let message = || format!("{name}: stiffness = {stiffness}: must be above 0 and at most 1e30");
+                ensure(stiffness > 0.0 && stiffness <= 1e30, message)?;
+                let message = || format!("{name}: damping = {damping}: must be 0 to 1e30");
+                ensure((0.0..=1e30).contains(&damping), message)?;
+                max_load
+            }
         };
         ensure(max_load >= 0.0, || format!("{name}: max_load = {max_load}: must be at least 0"))
     }

@@ -18,7 +18,7 @@ mod tag;
 
 pub use bodies::{Bodies, BodyHandle};
 pub(crate) use body::Surface;
-pub use body::{Body, BodyKind, Collider, Material};
+pub use body::{Body, BodyKind, Collider, CombineRule, Material};
 pub(crate) use change::WorldChange;
 pub use groups::Groups;
 pub use joint::{Joint, Linear};
@@ -253,7 +253,11 @@ impl World {
 
     /// Largest error of any joint (m): the distance of its anchors along locked axes, and beyond its limits.
     pub fn joint_gap(&self) -> f32 {
-        self.joints.iter().map(|joint| self.joint_motion(joint).gap(joint)).fold(0.0, f32::max)
+        self.joints
+            .iter()
+            .filter(|joint| joint.enabled)
+            .map(|joint| self.joint_motion(joint).gap(joint))
+            .fold(0.0, f32::max)
     }
 
     /// Refuses a world that cannot be simulated:

@@ -4,7 +4,8 @@ use crate::common::state::reference;
 use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::{
-    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Scene, Shape, Simulation, SolverConfig, StepStats, World,
+    Backend, Body, BodyHandle, BodyKind, CombineRule, Cpu, Joint, Material, Scene, Shape, Simulation, SolverConfig,
+    StepStats, World,
 };
 
 const DT: f32 = 1.0 / 60.0;
@@ -123,6 +124,22 @@ fn locked_bodies_go_on_to_the_same_bits() {
         }
     };
     goes_on("locked", &scene("pile-mixed", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40, 50, 51], lock);
+}
+
+/// The same of materials of shapes, and of their rules.
+#[test]
+fn bodies_with_materials_of_shapes_go_on_to_the_same_bits() {
+    let paint = |step: u32, world: &mut World| {
+        if step == 12 || step == 50 {
+            let rules = [None, Some(CombineRule::Average), Some(CombineRule::Multiply)];
+            for (k, body) in world.bodies.iter_mut().enumerate() {
+                (body.material.friction_rule, body.material.restitution_rule) = (rules[k % 3], rules[k / 3 % 3]);
+                let own = Material { restitution: 0.3, friction_rule: rules[k % 2], ..Material::default() };
+                body.colliders.iter_mut().for_each(|c| c.material = (k % 4 < 2).then_some(own));
+            }
+        }
+    };
+    goes_on("painted", &scene("pile-mixed", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40, 50, 51], paint);
 }
 
 #[test]

@@ -160,6 +160,10 @@ fn scale_axis(axis: &mut Axis, length: f32, time: f32, load: f32) {
         Drive::Spring { target, frequency, max_load, .. } => {
             (*target, *frequency, *max_load) = (*target * length, *frequency / time, *max_load * load);
         }
+        Drive::SpringDamper { target, stiffness, damping, max_load } => {
+            (*target, *max_load) = (*target * length, *max_load * load);
+            (*stiffness, *damping) = (*stiffness * load / length, *damping * load * time / length);
+        }
     }
 }
 

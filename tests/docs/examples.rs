@@ -1,6 +1,9 @@
 //! Runs the examples that print what happens.
 
 #[allow(dead_code, reason = "the tests call run, and no main")]
+#[path = "../../examples/one_way_platform.rs"]
+mod one_way_platform;
+#[allow(dead_code, reason = "the tests call run, and no main")]
 #[path = "../../examples/queries.rs"]
 mod queries;
 #[allow(dead_code, reason = "the tests call run, and no main")]
@@ -29,6 +32,13 @@ fn the_example_of_queries_prints_where_bodies_are() {
     ];
     assert_eq!(lines[..5], expected);
     assert_eq!(lines.iter().filter(|line| line.starts_with("the blast pushes crate")).count(), 2, "{lines:?}");
+}
+
+#[test]
+fn balls_that_fly_above_the_platform_lie_on_it() {
+    let lines = lines(|print| one_way_platform::run(print));
+    let heights = [(3, "0.20"), (6, "1.30"), (9, "1.30")];
+    assert_eq!(lines, heights.map(|(speed, height)| format!("thrown up at {speed} m/s: {height} m high")));
 }
 
 #[test]

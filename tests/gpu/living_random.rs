@@ -202,7 +202,11 @@ impl Run {
                 model.mass = body.mass.mass;
             }
             10 => {
-                model.material = Material { friction: random.within(0.0, 1.0), restitution: random.within(0.0, 0.5) };
+                model.material = Material {
+                    friction: random.within(0.0, 1.0),
+                    restitution: random.within(0.0, 0.5),
+                    ..Material::default()
+                };
                 self.simulation.world.body_mut(handle).expect("a body").material = model.material;
             }
             11 => {

@@ -23,7 +23,9 @@ mod forces;
 mod golden_gpu;
 #[cfg(feature = "serde")]
 mod gpu;
+mod hooks;
 mod jamming;
+mod joint_forces;
 mod joint_kinds;
 mod joints;
 mod kernels;
@@ -37,6 +39,7 @@ mod saved_problem;
 mod solver;
 #[cfg(feature = "serde")]
 mod spin;
+mod spring_dampers;
 mod teleports;
 mod waits;
 
@@ -56,7 +59,9 @@ fn main() -> std::process::ExitCode {
         golden_gpu::tests(),
         #[cfg(feature = "serde")]
         gpu::tests(),
+        hooks::tests(),
         jamming::tests(),
+        joint_forces::tests(),
         joint_kinds::tests(),
         joints::tests(),
         kernels::tests(),
@@ -70,6 +75,7 @@ fn main() -> std::process::ExitCode {
         solver::tests(),
         #[cfg(feature = "serde")]
         spin::tests(),
+        spring_dampers::tests(),
         teleports::tests(),
         waits::tests(),
     ])

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use drystone::scenes::{SceneFile, load, schema};
-use drystone::{BodyKind, Error, Scene};
+use drystone::{BodyKind, CombineRule, Error, Material, Scene};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 
@@ -438,6 +438,34 @@ fn additional_mass_of_a_body_is_a_key() {
 }
 
 #[test]
+fn materials_of_shapes_and_their_rules_are_keys() {
+    let read = |body: &str, shape: &str| {
+        let shape = format!(r#"{{"type": "cuboid", "half_extents": [0.5, 0.5, 0.5]{shape}}}"#);
+        let text = format!(r#"{{"version": 1, "bodies": [{{"name": "b", "shapes": [{shape}]{body}}}]}}"#);
+        SceneFile::parse(&text).and_then(|file| file.into_scene("a"))
+    };
+    let body = r#", "friction": 0.2, "friction_rule": "geometric_mean", "restitution_rule": "average""#;
+    let scene = read(body, r#", "material": {"friction": 0.1, "friction_rule": "minimum"}"#).expect("a scene");
+    let again = SceneFile::parse(&SceneFile::of(&scene).expect("a file").to_text()).expect("its text");
+    let own = Material { friction: 0.1, friction_rule: Some(CombineRule::Minimum), ..Material::default() };
+    for world in [scene.world, again.into_scene("a").expect("a scene").world] {
+        let body = &world.bodies[0];
+        assert_eq!(body.colliders[0].material, Some(own));
+        let rules = [body.material.friction_rule, body.material.restitution_rule];
+        assert_eq!(rules, [Some(CombineRule::GeometricMean), Some(CombineRule::Average)]);
+        assert_eq!(body.material.friction, 0.2);
+    }
+    assert_eq!(read("", "").expect("a scene").world.bodies[0].colliders[0].material, None);
+    let line = |body: &str, shape: &str| read(body, shape).map(|_| ()).expect_err("a refusal").to_string();
+    let bounce = line("", r#", "material": {"restitution": 2}"#);
+    assert_eq!(bounce, "body 0 \"b\": shapes[0]: restitution = 2: must be 0 to 1");
+    let huge = line("", r#", "material": {"friction": 1e300}"#);
+    assert!(huge.starts_with("body 0 \"b\": shapes[0]: material: friction = 1e300"), "{huge}");
+    let rule = line(r#", "friction_rule": "mean""#, "");
+    assert!(rule.starts_with("body 0 \"b\": friction_rule: "), "{rule}");
+}
+
+#[test]
 fn the_schema_describes_every_key() {
     let schema = schema();
     let keys = |object: &Value| {
@@ -452,16 +480,16 @@ fn the_schema_describes_every_key() {
     let body = &schema["$defs"]["BodyFile"];
     assert_eq!(
         keys(body),
-        "additional_mass angular_damping angular_velocity can_sleep density force friction gravity_scale groups kind leaves linear_damping linear_velocity locked_rotations mass \
-         mass_properties name position restitution rotation shapes swept torque"
+        "additional_mass angular_damping angular_velocity can_sleep density force friction friction_rule gravity_scale groups kind leaves linear_damping linear_velocity locked_rotations mass \
+         mass_properties name position restitution restitution_rule rotation shapes swept torque"
     );
     assert_eq!(keys(&schema["$defs"]["SpawnerFile"]), "body count every first");
     assert_eq!(keys(&schema["$defs"]["LeavesFile"]), "after below");
     assert_eq!(keys(&schema["$defs"]["Groups"]), "filter membership");
-    assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "position rotation sensor");
+    assert_eq!(keys(&schema["$defs"]["ShapeFile"]), "material position rotation sensor");
     assert_eq!(schema["$defs"]["ShapeFile"]["unevaluatedProperties"], false);
     let joint = &schema["$defs"]["JointFile"];
-    assert_eq!(keys(joint), "anchor anchors bodies break_force collide");
+    assert_eq!(keys(joint), "anchor anchors bodies break_force collide enabled");
     assert_eq!((&joint["required"], &joint["unevaluatedProperties"]), (&json!(["bodies"]), &json!(false)));
     let kinds = joint["oneOf"].as_array().expect("kinds").iter();
     let kinds: Vec<_> = kinds.map(|kind| kind["properties"]["type"]["const"].clone()).collect();

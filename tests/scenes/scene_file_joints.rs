@@ -120,6 +120,11 @@ fn every_kind_of_joint_is_read_with_its_limits_and_drives() {
     assert!(axis.distance(Vec3::Y) < 1e-6, "{axis}");
     let shift = Axis::FREE.spring(0.1, 2.0, 0.5, 9.0);
     assert_eq!((slider.linear, slider.angular), (Linear::Axes([shift, Axis::LOCKED, Axis::LOCKED]), [Axis::LOCKED; 3]));
+    let spring = json!({"target": 0.1, "stiffness": 200, "damping": 3});
+    let (slider, _) = with(json!({"type": "slider", "axis": [0, 1, 0], "spring": spring, "enabled": false}));
+    let shift = Axis::FREE.spring_damper(0.1, 200.0, 3.0, f32::MAX);
+    assert_eq!((slider.linear, slider.enabled), (Linear::Axes([shift, Axis::LOCKED, Axis::LOCKED]), false));
+    assert!(hinge.enabled);
     assert_eq!(with(json!({"type": "fixed"})).0.angular, [Axis::LOCKED; 3]);
     assert!(with(json!({"type": "ball"})).0.is_ball());
     let (rope, _) = with(json!({"type": "distance", "limits": [0, 2]}));
@@ -158,6 +163,9 @@ fn an_impossible_axis_is_refused_in_one_line() {
         (hinge("motor", json!({"speed": 1, "max_load": -1})), "angular: max_load = -1: must be at least 0"),
         (hinge("spring", json!({"frequency": 0})), "angular: frequency = 0: must be above 0"),
         (hinge("spring", json!({"frequency": 1, "damping_ratio": -1})), "angular: damping_ratio = -1: must be 0"),
+        (hinge("spring", json!({})), "spring: give frequency, with damping_ratio, or stiffness, with damping"),
+        (hinge("spring", json!({"frequency": 1, "damping": 1})), "spring: give frequency, with damping_ratio, or"),
+        (hinge("spring", json!({"stiffness": -1})), "angular: stiffness = -1: must be above 0"),
         (hinge("locked", json!(true)), "unknown field `locked`"),
         (refused(json!({"type": "distance", "limits": [-1, 1]})), "distance: limits -1 and 1: must ascend"),
         (
@@ -199,4 +207,21 @@ fn a_limit_that_is_null_is_none_on_that_side_and_is_written_so() {
             assert_eq!(again.world.joints[0], scene.world.joints[0]);
         }
     }
+}
+
+#[test]
+fn springs_of_a_stiffness_and_joints_that_are_off_are_written_so() {
+    let spring = json!({"target": 0.25, "stiffness": 200, "damping": 3, "max_load": 9});
+    let joint = json!({"type": "distance", "bodies": ["a"], "anchor": [0, 0, 0], "spring": spring, "enabled": false});
+    let scene = read(&joint).expect("a good scene");
+    let expected = Axis::FREE.spring_damper(0.25, 200.0, 3.0, 9.0);
+    assert_eq!((scene.world.joints[0].linear, scene.world.joints[0].enabled), (Linear::Distance(expected), false));
+    let text = SceneFile::of(&scene).expect("a file").to_text();
+    let written: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(
+        written["joints"][0]["spring"],
+        json!({"target": 0.25, "stiffness": 200.0, "damping": 3.0, "max_load": 9.0})
+    );
+    let again = SceneFile::parse(&text).and_then(|file| file.into_scene("again")).expect("the same scene");
+    assert_eq!(again.world.joints[0], scene.world.joints[0]);
 }

@@ -3,7 +3,7 @@
 use std::fmt::{self, Debug, Write};
 use std::hash::Hasher;
 
-use drystone::{BodyHandle, Joint, Scene};
+use drystone::{BodyHandle, Joint, Material, Scene};
 use fnv::FnvHasher;
 
 /// Feeds text to a hasher.
@@ -30,6 +30,9 @@ impl Debug for Content<'_> {
             content.field("linear", &joint.linear).field("angular", &joint.angular);
         }
         content.field("collide", &joint.collide);
+        if !joint.enabled {
+            content.field("enabled", &joint.enabled);
+        }
         if !joint.is_ball() {
             content.field("break_force", &joint.break_force);
         }
@@ -48,7 +51,12 @@ pub fn content_hash(scene: &Scene) -> String {
     }
     for b in &scene.world.bodies {
         let pose = (b.kind, b.position, b.rotation, b.linear_velocity, b.angular_velocity);
-        let _ = write!(sink, "{pose:?} {:?} {:?} {:?}", b.force, b.mass, b.material);
+        let Material { friction, restitution, friction_rule, restitution_rule } = b.material;
+        let material = format!("Material {{ friction: {friction:?}, restitution: {restitution:?} }}");
+        let _ = write!(sink, "{pose:?} {:?} {:?} {material}", b.force, b.mass);
+        if (friction_rule, restitution_rule) != (None, None) {
+            let _ = write!(sink, "rules {friction_rule:?} {restitution_rule:?}");
+        }
         // Most scenes have neither, and keep the hashes that reports name.
         if (b.torque, b.gravity_scale) != (drystone::glam::Vec3::ZERO, 1.0) {
             let _ = write!(sink, "{:?} {:?}", b.torque, b.gravity_scale);
@@ -66,6 +74,9 @@ pub fn content_hash(scene: &Scene) -> String {
             let _ = write!(sink, "{:?} {:?} {:?}", c.shape.parry().as_typed_shape(), c.position, c.rotation);
             if c.sensor {
                 let _ = write!(sink, " sensor");
+            }
+            if let Some(material) = c.material {
+                let _ = write!(sink, " {material:?}");
             }
         }
     }
@@ -85,7 +96,7 @@ mod tests {
     fn the_hash_sees_what_a_step_sees() {
         let scene = Scene::find("drop", &[]).unwrap();
         assert_eq!(content_hash(&scene), content_hash(&Scene::find("drop", &[]).unwrap()));
-        let changes: [fn(&mut Scene); 12] = [
+        let changes: [fn(&mut Scene); 14] = [
             |s| s.dt *= 0.5,
             |s| s.world.bodies[3].position.x += 1e-6,
             |s| s.world.bodies[3].force.y = 1e-3,
@@ -96,6 +107,8 @@ mod tests {
             |s| s.world.bodies[3].can_sleep = false,
             |s| s.world.own_gravity = vec![Some(drystone::glam::Vec3::X)],
             |s| s.world.bodies[3].material.friction = 0.51,
+            |s| s.world.bodies[3].material.friction_rule = Some(drystone::CombineRule::Average),
+            |s| s.world.bodies[3].colliders[0].material = Some(Material::default()),
             |s| s.world.bodies[3].colliders[0].shape = drystone::Shape::ball(0.25),
             |s| s.world.beside(&drystone::World::new()),
         ];

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::super::bodies::mass_row;
 use super::super::carry::Carry;
+use super::super::effective::LEAST_JAMMING;
 use super::super::prepare::{ComputedRow, PoseRow};
 use super::super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
 use super::super::slots::Write;
@@ -81,12 +82,17 @@ impl ContactRows {
             classes,
             materials,
             new_bodies: _,
+            hooked,
             sums: _,
             carry: _,
         } = self;
         patches.walk(archive)?;
         materials.walk(archive)?;
         let is_taken = walk_slots(slots, detector, archive)?;
+        hooked.walk(archive)?;
+        ensure(hooked.len() <= slots.all.len(), || {
+            format!("materials of {} contacts, of {}", hooked.len(), slots.all.len())
+        })?;
         walk_same(coloring, || lay_out(&slots.edges, &slots.taking_part().collect::<Vec<_>>()), archive)?;
         walk_same(classes, || effort.classes().to_vec(), archive)?;
         let (count, stride) = (slots.all.len(), points_a_slot(*patches));
@@ -137,7 +143,9 @@ impl ContactRows {
             carry: &carry,
             brings_impulses: false,
             patches: *patches,
-            may_jam: materials.unwrap_or_else(|| Materials::of(world)).may_jam,
+            hooked,
+            may_jam: materials.unwrap_or_else(|| Materials::of(world)).may_jam
+                || hooked.iter().flatten().any(|material| material.friction > LEAST_JAMMING),
         };
         let slips = rule == FrictionRule::Slip && !*patches;
         let task = |first: usize| {

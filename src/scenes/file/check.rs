@@ -2,16 +2,18 @@
 
 use std::fmt::Display;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::joint::joint;
 use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
-use super::schema::{AdditionalMassFile, BodyFile, Geometry, LeavesFile, MassFile, SceneFile, ShapeFile, SpawnerFile};
+use super::schema::{
+    AdditionalMassFile, BodyFile, Geometry, LeavesFile, MassFile, MaterialFile, SceneFile, ShapeFile, SpawnerFile,
+};
 use crate::config::check_step_length;
 use crate::error::{Error, Result, ensure, input};
 use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
-use crate::world::{Body, BodyKind, MassProperties, Shape, World};
+use crate::world::{Body, BodyKind, Collider, MassProperties, Material, Shape, World};
 
 /// The scene that a file describes. Its name is `name` if the file has none.
 pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
@@ -80,17 +82,15 @@ fn body(file: &BodyFile) -> Result<Body> {
     (body.locked_rotations, body.can_sleep) = (file.locked_rotations, file.can_sleep);
     body.groups = file.groups;
     body.swept = file.swept;
-    let [friction, restitution] =
-        [("friction", file.friction), ("restitution", file.restitution)].map(|(name, x)| finite(name, [x]));
+    let BodyFile { friction, restitution, friction_rule, restitution_rule, .. } = *file;
+    let own = material(&MaterialFile { friction, restitution, friction_rule, restitution_rule })?;
     let mut body = body
         .position(x, y, z)
         .rotation(rotation("rotation", file.rotation)?)
         .velocity(linear.into(), angular.into())
-        .friction(friction?[0])
-        .restitution(restitution?[0]);
+        .material(own);
     for (k, shape_file) in file.shapes.iter().enumerate() {
-        let (shape, at, turned) = shape(shape_file).map_err(|e| e.within(format_args!("shapes[{k}]")))?;
-        body = if shape_file.sensor { body.sensor_at(shape, at, turned) } else { body.shape_at(shape, at, turned) };
+        body = body.collider(collider(shape_file).map_err(|e| e.within(format_args!("shapes[{k}]")))?);
     }
     let body = with_mass(body, file)?;
     body.check().map(|()| body)
@@ -165,8 +165,14 @@ fn additional_mass(file: &AdditionalMassFile) -> Result<MassProperties> {
     })
 }
 
-/// The shape, its position and its rotation. All are checked before the body computes a mass from them.
-fn shape(file: &ShapeFile) -> Result<(Shape, Vec3, Quat)> {
+fn material(file: &MaterialFile) -> Result<Material> {
+    let MaterialFile { friction, restitution, friction_rule, restitution_rule } = *file;
+    let ([friction], [restitution]) = (finite("friction", [friction])?, finite("restitution", [restitution])?);
+    Ok(Material { friction, restitution, friction_rule, restitution_rule })
+}
+
+/// A shape on a body. It is checked before the body computes a mass from it.
+fn collider(file: &ShapeFile) -> Result<Collider> {
     let extent = |name: &str, x: f64| finite(name, [x]).map(|[x]| x);
     let round = |of: fn(f32, f32) -> Shape, half_height: f64, radius: f64| -> Result<Shape> {
         Ok(of(extent("half_height", half_height)?, extent("radius", radius)?))
@@ -194,7 +200,13 @@ fn shape(file: &ShapeFile) -> Result<(Shape, Vec3, Quat)> {
         }
     };
     shape.check()?;
-    Ok((shape, lengths("position", file.position)?.into(), rotation("rotation", file.rotation)?))
+    Ok(Collider {
+        position: lengths("position", file.position)?.into(),
+        rotation: rotation("rotation", file.rotation)?,
+        sensor: file.sensor,
+        material: file.material.as_ref().map(material).transpose().map_err(|e| e.within("material"))?,
+        ..Collider::new(shape)
+    })
 }
 
 fn vertices(name: &str, points: &[[f64; 3]]) -> Result<Vec<Vec3>> {

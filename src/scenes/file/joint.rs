@@ -42,7 +42,7 @@ impl BodyRef {
 
 /// The joint that `file` describes, between bodies of `world`.
 pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
-    let JointFile { bodies, anchor, anchors, collide, break_force, kind } = file;
+    let JointFile { bodies, anchor, anchors, collide, enabled, break_force, kind } = file;
     let (a, b) = match &bodies[..] {
         [a] => (a.find(world)?, None),
         [a, b] => (a.find(world)?, Some(b.find(world)?)),
@@ -69,6 +69,7 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
     let joint = Joint {
         body_b: b.map(&handle),
         collide: *collide,
+        enabled: *enabled,
         break_force,
         ..Joint::to_world(handle(a), anchor_a, anchor_b)
     };
@@ -143,12 +144,27 @@ fn read_axis(
         (Some(MotorFile { speed, max_load }), None) => {
             Drive::Motor { speed: number("motor.speed", *speed)?, max_load: number("motor.max_load", *max_load)? }
         }
-        (None, Some(SpringFile { target, frequency, damping_ratio, max_load })) => Drive::Spring {
-            target: number("spring.target", *target)?,
-            frequency: number("spring.frequency", *frequency)?,
-            damping_ratio: number("spring.damping_ratio", *damping_ratio)?,
-            max_load: max_load.map_or(Ok(f32::MAX), |max_load| number("spring.max_load", max_load))?,
-        },
+        (None, Some(SpringFile { target, frequency, damping_ratio, stiffness, damping, max_load })) => {
+            let target = number("spring.target", *target)?;
+            let max_load = max_load.map_or(Ok(f32::MAX), |max_load| number("spring.max_load", max_load))?;
+            match (frequency, damping_ratio, stiffness, damping) {
+                (Some(frequency), ratio, None, None) => Drive::Spring {
+                    target,
+                    frequency: number("spring.frequency", *frequency)?,
+                    damping_ratio: number("spring.damping_ratio", ratio.unwrap_or(1.0))?,
+                    max_load,
+                },
+                (None, None, Some(stiffness), damping) => Drive::SpringDamper {
+                    target,
+                    stiffness: number("spring.stiffness", *stiffness)?,
+                    damping: number("spring.damping", damping.unwrap_or(0.0))?,
+                    max_load,
+                },
+                _ => {
+                    return Err(input!("{name}spring: give frequency, with damping_ratio, or stiffness, with damping"));
+                }
+            }
+        }
         (None, None) => Drive::None,
     };
     Ok(Axis { bounds, drive })

@@ -7,8 +7,8 @@ mod schema;
 mod write;
 
 pub use schema::{
-    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile,
-    SceneFile, ShapeFile, SpawnerFile, SpringFile,
+    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile,
+    MaterialFile, MotorFile, SceneFile, ShapeFile, SpawnerFile, SpringFile,
 };
 
 use std::path::Path;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::world::{BodyKind, Groups};
+use crate::world::{BodyKind, CombineRule, Groups};
 
 /// The content of a scene file, version 1. Parsing checks only its form.
 ///
@@ -19,8 +19,8 @@ use crate::world::{BodyKind, Groups};
 ///
 /// ```
 /// use drystone::scenes::{
-///     AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile,
-///     ShapeFile, SpawnerFile, SpringFile,
+///     AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile,
+///     MaterialFile, MotorFile, SceneFile, ShapeFile, SpawnerFile, SpringFile,
 /// };
 ///
 /// let text = r#"{"version": 1,
@@ -28,22 +28,25 @@ use crate::world::{BodyKind, Groups};
 ///         {"name": "door", "position": [0.5, 1, 0], "leaves": {"after": 9},
 ///          "mass_properties": {"mass": 20, "principal_inertia": [1, 1, 1]},
 ///          "shapes": [{"type": "cuboid", "half_extents": [0.5, 1, 0.02]}]},
-///         {"name": "lamp", "position": [3, 1, 0], "additional_mass": {"mass": 2}, "shapes": [{"type": "ball", "radius": 0.1}]}],
+///         {"name": "lamp", "position": [3, 1, 0], "additional_mass": {"mass": 2},
+///          "shapes": [{"type": "ball", "radius": 0.1, "material": {"friction": 0.1}}]}],
 ///     "joints": [
 ///         {"type": "hinge", "bodies": ["door"], "anchor": [0, 1, 0], "axis": [0, 1, 0], "motor": {"speed": 1, "max_load": 9}},
 ///         {"type": "generic", "bodies": [1], "anchor": [3, 2, 0], "linear": [{}, {"spring": {"frequency": 2}}, {}], "angular": [{}, {}, {}]}],
 ///     "spawners": [{"every": 60, "body": {"shapes": [{"type": "ball", "radius": 0.3}]}}]}"#;
 /// let file = SceneFile::parse(text)?;
-/// let [BodyFile { leaves, mass_properties, shapes, .. }, BodyFile { additional_mass, .. }] = &file.bodies[..] else { panic!("two bodies") };
+/// let [BodyFile { leaves, mass_properties, shapes, .. }, lamp] = &file.bodies[..] else { panic!("two bodies") };
+/// let BodyFile { additional_mass, shapes: of_lamp, .. } = lamp;
 /// assert!(matches!(leaves, Some(LeavesFile { after: Some(9.0), below: None })));
 /// assert!(matches!(mass_properties, Some(MassFile { mass: 20.0, .. })));
 /// assert!(matches!(additional_mass, Some(AdditionalMassFile { mass: 2.0, principal_inertia: [0.0, 0.0, 0.0], .. })));
 /// assert!(matches!(&shapes[..], [ShapeFile { geometry: Geometry::Cuboid { .. }, sensor: false, .. }]));
+/// assert!(matches!(of_lamp[0].material, Some(MaterialFile { friction: 0.1, restitution: 0.0, .. })));
 /// let [door, lamp]: &[JointFile; 2] = file.joints[..].try_into().expect("two joints");
 /// assert!(matches!(&door.bodies[..], [BodyRef::Name(name)] if name == "door"));
 /// assert!(matches!(&door.kind, JointKind::Hinge { motor: Some(MotorFile { speed: 1.0, .. }), .. }));
 /// let JointKind::Generic { linear, .. } = &lamp.kind else { panic!("a generic joint") };
-/// assert!(matches!(linear[1], AxisFile { spring: Some(SpringFile { frequency: 2.0, .. }), .. }));
+/// assert!(matches!(linear[1], AxisFile { spring: Some(SpringFile { frequency: Some(2.0), .. }), .. }));
 /// assert!(matches!(file.spawners[..], [SpawnerFile { every: 60, first: 0, .. }]));
 /// assert_eq!(file.into_scene("room")?.world.dynamic_count(), 2);
 /// # Ok::<(), drystone::Error>(())
@@ -153,10 +156,17 @@ pub struct BodyFile {
     /// Mass added to that of the shapes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub additional_mass: Option<AdditionalMassFile>,
-    /// Coulomb coefficient, 0 or more. A contact has the geometric mean of both bodies.
+    /// Coulomb coefficient of the shapes without own material, 0 or more.
     pub friction: f64,
-    /// Ratio of separation to approach velocity, 0 to 1. A contact has the larger value of both bodies.
+    /// Ratio of separation to approach velocity of the shapes without own material, 0 to 1.
     pub restitution: f64,
+    /// How contacts combine friction. Of two rules the later one in the list counts; by default it is the geometric
+    /// mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_rule: Option<CombineRule>,
+    /// How contacts combine restitution, likewise; by default it is the larger value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub restitution_rule: Option<CombineRule>,
     /// Collision groups: which bodies it collides with. 32 groups, one bit each.
     pub groups: Groups,
     /// Whether the body is a bullet, which does not pass through moving bodies.
@@ -190,6 +200,8 @@ impl Default for BodyFile {
             additional_mass: None,
             friction: 0.5,
             restitution: 0.0,
+            friction_rule: None,
+            restitution_rule: None,
             groups: Groups::ALL,
             swept: false,
             leaves: None,
@@ -246,9 +258,35 @@ pub struct ShapeFile {
     /// Whether the shape is a sensor. A sensor detects other shapes and has no contacts.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sensor: bool,
+    /// The material of the shape, in place of that of the body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<MaterialFile>,
     /// The geometry of the shape. A key that neither part knows is refused.
     #[serde(flatten)]
     pub geometry: Geometry,
+}
+
+/// The material of a shape.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(title = "Material")]
+pub struct MaterialFile {
+    /// Coulomb coefficient, 0 or more.
+    pub friction: f64,
+    /// Ratio of separation to approach velocity, 0 to 1.
+    pub restitution: f64,
+    /// How contacts combine friction: see the key of a body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_rule: Option<CombineRule>,
+    /// How contacts combine restitution: see the key of a body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub restitution_rule: Option<CombineRule>,
+}
+
+impl Default for MaterialFile {
+    fn default() -> Self {
+        Self { friction: 0.5, restitution: 0.0, friction_rule: None, restitution_rule: None }
+    }
 }
 
 /// A shape in its own frame. All lengths are in m and more than 0.
@@ -330,6 +368,9 @@ pub struct JointFile {
     /// Whether the two bodies still collide with each other.
     #[serde(default)]
     pub collide: bool,
+    /// Whether the joint acts.
+    #[serde(default = "defaults::enabled", skip_serializing_if = "Clone::clone")]
+    pub enabled: bool,
     /// The force at which the joint breaks (N), averaged over a step, more than 0; by default the joint never breaks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub break_force: Option<f64>,
@@ -455,10 +496,17 @@ pub struct SpringFile {
     #[serde(default)]
     pub target: f64,
     /// Frequency of the moved mass without damping (Hz), more than 0.
-    pub frequency: f64,
-    /// Damping ratio: 0 is undamped, 1 is critically damped.
-    #[serde(default = "defaults::damping_ratio")]
-    pub damping_ratio: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frequency: Option<f64>,
+    /// Damping ratio with a frequency: 0 is undamped, 1, the default, is critically damped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping_ratio: Option<f64>,
+    /// Force by distance, or torque by angle, instead of a frequency (N/m, N m/rad), more than 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<f64>,
+    /// Force by speed, or torque by angular speed, with a stiffness (N s/m, N m s/rad); 0 by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping: Option<f64>,
     /// The largest force or torque (N, N m); unlimited by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_load: Option<f64>,
@@ -475,6 +523,10 @@ pub enum BodyRef {
 }
 
 mod defaults {
+    pub(super) fn enabled() -> bool {
+        true
+    }
+
     pub(super) fn gravity() -> [f64; 3] {
         [0.0, -9.81, 0.0]
     }
@@ -485,10 +537,6 @@ mod defaults {
 
     pub(super) fn steps() -> u32 {
         600
-    }
-
-    pub(super) fn damping_ratio() -> f64 {
-        1.0
     }
 
     pub(super) fn rotation() -> [f64; 4] {

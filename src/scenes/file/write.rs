@@ -3,13 +3,13 @@
 use parry3d::shape::TypedShape;
 
 use super::schema::{
-    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MotorFile, SceneFile, ShapeFile,
-    SpawnerFile, SpringFile,
+    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MaterialFile, MotorFile,
+    SceneFile, ShapeFile, SpawnerFile, SpringFile,
 };
 use crate::error::{Error, Result, ensure, input};
 use crate::scenes::scene::Scene;
 use crate::scenes::spawner::{Leaves, Spawner};
-use crate::world::{Axis, Body, BodyKind, Bounds, Collider, Drive, Joint, Linear};
+use crate::world::{Axis, Body, BodyKind, Bounds, Collider, Drive, Joint, Linear, Material};
 
 /// The file of a scene, with every number to the last bit. The index of a body in the file counts only bodies that are
 /// present.
@@ -91,6 +91,8 @@ fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
         additional_mass: None,
         friction: number(b.material.friction),
         restitution: number(b.material.restitution),
+        friction_rule: b.material.friction_rule,
+        restitution_rule: b.material.restitution_rule,
         groups: b.groups,
         swept: b.swept,
         leaves: leaves.map(|Leaves { below, after }| LeavesFile { below: below.map(number), after: after.map(number) }),
@@ -122,7 +124,13 @@ fn shape(c: &Collider) -> Result<ShapeFile> {
         _ => return Err(input!("a shape of type {:?}: a scene file cannot represent it", c.shape)),
     };
     let (position, rotation) = (numbers(c.position.to_array()), numbers(c.rotation.to_array()));
-    Ok(ShapeFile { position, rotation, sensor: c.sensor, geometry })
+    let material = c.material.map(|Material { friction, restitution, friction_rule, restitution_rule }| MaterialFile {
+        friction: number(friction),
+        restitution: number(restitution),
+        friction_rule,
+        restitution_rule,
+    });
+    Ok(ShapeFile { position, rotation, sensor: c.sensor, material, geometry })
 }
 
 fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {
@@ -151,6 +159,7 @@ fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {
         anchor: None,
         anchors: Some([joint.anchor_a, joint.anchor_b].map(|anchor| numbers(anchor.to_array()))),
         collide: joint.collide,
+        enabled: joint.enabled,
         break_force: joint.can_break().then(|| number(joint.break_force)),
         kind,
     })
@@ -169,8 +178,20 @@ fn axis(axis: &Axis) -> AxisFile {
         Drive::Spring { target, frequency, damping_ratio, max_load } => {
             file.spring = Some(SpringFile {
                 target: number(target),
-                frequency: number(frequency),
-                damping_ratio: number(damping_ratio),
+                frequency: Some(number(frequency)),
+                damping_ratio: Some(number(damping_ratio)),
+                stiffness: None,
+                damping: None,
+                max_load: (max_load < f32::MAX).then(|| number(max_load)),
+            });
+        }
+        Drive::SpringDamper { target, stiffness, damping, max_load } => {
+            file.spring = Some(SpringFile {
+                target: number(target),
+                frequency: None,
+                damping_ratio: None,
+                stiffness: Some(number(stiffness)),
+                damping: Some(number(damping)),
                 max_load: (max_load < f32::MAX).then(|| number(max_load)),
             });
         }

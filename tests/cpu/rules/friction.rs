@@ -2,7 +2,8 @@
 
 use drystone::config::{Friction, FrictionAt};
 use drystone::stages::problem::ContactRow;
-use drystone::{Material, SolverConfig, StepProblem, World};
+use drystone::world::Collider;
+use drystone::{Body, CombineRule, Material, Shape, Simulation, SolverConfig, StepProblem, World};
 use glam::{Quat, Vec3};
 
 use super::{DT, G, bounced, cube, floor, near, on_a_slope, on_a_slope_that_falls, run, simulation};
@@ -47,7 +48,7 @@ fn a_sliding_box_stops_where_friction_says_under_every_rule() {
 
 #[test]
 fn surfaces_combine_to_the_mean_friction_and_the_larger_restitution() {
-    let material = |friction, restitution| Material { friction, restitution };
+    let material = |friction, restitution| Material { friction, restitution, ..Material::default() };
     for (a, b) in [(material(0.8, 0.1), material(0.2, 0.6)), (material(0.2, 0.6), material(0.8, 0.1))] {
         let both = a.combine(b);
         assert_eq!((both.friction, both.restitution), ((0.8_f32 * 0.2).sqrt(), 0.6));
@@ -57,6 +58,87 @@ fn surfaces_combine_to_the_mean_friction_and_the_larger_restitution() {
     near("slide", slid(SolverConfig::default().without_sleep(), [0.8, 0.2]), expected, 0.005 * expected);
     near("lively ball", bounced(3.0, [0.8, 0.0]), 2.4, 1e-5);
     near("lively floor", bounced(3.0, [0.0, 0.8]), 2.4, 1e-5);
+}
+
+/// The later rule in the list counts, and a material without rule follows the other.
+#[test]
+fn surfaces_combine_by_the_later_of_their_rules() {
+    use CombineRule::{Average, GeometricMean, Maximum, Minimum, Multiply};
+    let of = |number: f32, rule: Option<CombineRule>| Material {
+        friction: number,
+        restitution: number,
+        friction_rule: rule,
+        restitution_rule: rule,
+    };
+    let rules = [Average, GeometricMean, Minimum, Multiply, Maximum];
+    let (a, b) = (0.9, 0.4);
+    let numbers = [0.65, 0.6, 0.4, 0.36, 0.9];
+    for (i, (&rule, number)) in rules.iter().zip(numbers).enumerate() {
+        for other in [None].into_iter().chain(rules[..=i].iter().copied().map(Some)) {
+            for both in [of(a, Some(rule)).combine(of(b, other)), of(a, other).combine(of(b, Some(rule)))] {
+                near(&format!("friction by {rule:?} and {other:?}"), both.friction, number, 1e-6);
+                near(&format!("restitution by {rule:?} and {other:?}"), both.restitution, number, 1e-6);
+                assert_eq!((both.friction_rule, both.restitution_rule), (None, None));
+            }
+        }
+    }
+    // In a step: 0.65 of 0.9 and 0.4.
+    let mut world = World::new();
+    let rough = |friction| Material { friction, friction_rule: Some(Average), ..Material::default() };
+    world.add(floor().friction(0.4));
+    world.add(cube().material(rough(0.9)).velocity(Vec3::X * 4.0, Vec3::ZERO));
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep());
+    run(&mut simulation, 360, 1.0 / 240.0);
+    let expected = 16.0 / (2.0 * 0.65 * G);
+    near("slide", simulation.world.bodies[1].position.x, expected, 0.005 * expected);
+}
+
+/// A sled on two runners, whose own friction is 0.1 on a floor of 0.9: 0.3 brakes it, whatever the friction of its
+/// seat. The runners get rougher while it slides.
+#[test]
+fn a_shape_has_its_own_friction() {
+    let runner = |z: f32| Collider {
+        position: Vec3::new(0.0, -0.55, z),
+        material: Some(Material { friction: 0.1, ..Material::default() }),
+        ..Collider::new(Shape::cuboid(0.5, 0.05, 0.1))
+    };
+    let mut world = World::new();
+    world.add(floor().friction(0.9));
+    let sled = cube().position(0.0, 0.6, 0.0).collider(runner(-0.4)).collider(runner(0.4)).friction(2.0);
+    let sled = world.add(sled.velocity(Vec3::X * 4.0, Vec3::ZERO));
+    let mut simulation = simulation(world, SolverConfig::default().without_sleep());
+    let speed = |simulation: &Simulation| simulation.world.bodies[sled].linear_velocity.x;
+    run(&mut simulation, 60, 1.0 / 240.0);
+    near("speed on ice", speed(&simulation), 4.0 - 0.3 * G * 0.25, 0.01);
+    for collider in &mut simulation.world.bodies[sled].colliders {
+        collider.material.iter_mut().for_each(|material| material.friction = 0.4);
+    }
+    run(&mut simulation, 60, 1.0 / 240.0);
+    near("speed on rough runners", speed(&simulation), 4.0 - 0.9 * G * 0.25, 0.03);
+    simulation.world.bodies[sled].colliders[1].material = Some(Material { friction: -1.0, ..Material::default() });
+    let line = simulation.step(DT).expect_err("a negative friction").to_string();
+    assert!(line.ends_with("shapes[1]: friction = -1: must be 0 or more"), "{line}");
+}
+
+/// A dumbbell whose two ends bounce differently.
+#[test]
+fn a_shape_has_its_own_restitution() {
+    let end = |x: f32, restitution: f32| Collider {
+        position: Vec3::X * x,
+        material: Some(Material { restitution, ..Material::default() }),
+        ..Collider::new(Shape::ball(0.2))
+    };
+    for (turn, e) in [(0.0, 0.8), (std::f32::consts::PI, 0.3)] {
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        world.add(floor());
+        // One end is below the other.
+        let upright = Quat::from_rotation_z(turn) * Quat::from_rotation_z(-std::f32::consts::FRAC_PI_2);
+        let dumbbell = Body::dynamic().collider(end(0.5, 0.8)).collider(end(-0.5, 0.3)).rotation(upright);
+        world.add(dumbbell.position(0.0, 0.71, 0.0).velocity(Vec3::NEG_Y * 3.0, Vec3::ZERO));
+        let mut simulation = simulation(world, SolverConfig::default().without_sleep());
+        run(&mut simulation, 6, DT);
+        near("bounce", simulation.world.bodies[1].linear_velocity.y, 3.0 * e, 1e-3);
+    }
 }
 
 /// Friction mu N at each corner, a distance d from the axis, brakes a spin by mu m g d / I, with I = m/6 of a cube and d the half

@@ -1,0 +1,215 @@
+//! Code of the caller that refuses pairs and changes contacts within a step.
+
+use glam::Vec3;
+
+use super::events::ColliderOf;
+use super::stages::{Stages, collider_of};
+use crate::collide::{MAX_POINTS, Manifold, Pair};
+use crate::error::Result;
+use crate::panics::blaming;
+use crate::world::{Body, Material, World};
+
+/// Decides within a step which colliders touch, and how. See [`Simulation::set_hooks`](crate::Simulation::set_hooks).
+///
+/// Calls come one after another, in an order that depends neither on threads nor on lanes. Runs keep their bits if the
+/// answers depend only on the arguments and on state of the hooks that only these calls change. Such state is not part
+/// of a snapshot or of saved bytes: save and restore it together with the simulation. A step can call the hooks more
+/// than once for a pair, for example when a body wakes, and
+/// [`Simulation::next_problem`](crate::Simulation::next_problem) calls them too.
+///
+/// A panic of a hook is an error of the step ([`Error::Panicked`](crate::Error::Panicked)), which leaves the world as
+/// it was.
+///
+/// ```
+/// use drystone::{Body, ColliderOf, ContactHooks, PendingContact, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::glam::Vec3;
+///
+/// /// Bodies with a common name pass through each other, and the floor is icy where x is above 0.
+/// struct Rules;
+///
+/// impl ContactHooks for Rules {
+///     fn may_touch(&mut self, world: &World, a: ColliderOf, b: ColliderOf) -> bool {
+///         let [a, b] = [a, b].map(|side| world.body(side.body).expect("it is there"));
+///         a.name.is_empty() || a.name != b.name
+///     }
+///
+///     fn modify(&mut self, _: &World, contact: &mut PendingContact) {
+///         if contact.points()[0].position.x > 0.0 {
+///             contact.friction = 0.0;
+///         }
+///     }
+/// }
+///
+/// let mut world = World::new();
+/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let slider = || Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).velocity(Vec3::X, Vec3::ZERO);
+/// let [rough, icy] = [-10.0, 10.0].map(|x| world.add(slider().position(x, 0.5, 0.0)));
+/// let ghost = world.add(slider().named("ghost").position(20.0, 0.5, 0.0));
+/// world.add(slider().named("ghost").position(20.5, 0.5, 0.0));
+/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.set_hooks(Some(Box::new(Rules)));
+/// (0..30).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+/// let speed = |body: usize| simulation.world.bodies[body].linear_velocity.x;
+/// assert!(speed(rough).abs() < 1e-3 && (speed(icy) - 1.0).abs() < 1e-3 && (speed(ghost) - 1.0).abs() < 1e-3);
+/// # Ok::<(), drystone::Error>(())
+/// ```
+pub trait ContactHooks: Send {
+    /// Whether two colliders may touch in this step. `a` is of the body with the smaller index. Each step asks for
+    /// every pair whose boxes overlap and of which a body is awake or moves, before it computes contacts. A refused
+    /// pair costs nothing more, and its bodies pass through each other at any speed. Groups and joints are asked first;
+    /// sensors do not ask. All pairs may touch unless this is implemented.
+    fn may_touch(&mut self, world: &World, a: ColliderOf, b: ColliderOf) -> bool {
+        let _ = (world, a, b);
+        true
+    }
+
+    /// Changes a contact before the step solves it: its friction, its restitution, and which of its points act. Each
+    /// step calls it for every contact of an awake body, also where the surfaces are only near, with the values that
+    /// follow from the materials. A contact from which points are dropped is computed anew in every step, and does not
+    /// rest as still as a reused one.
+    fn modify(&mut self, world: &World, contact: &mut PendingContact) {
+        let _ = (world, contact);
+    }
+}
+
+/// A contact that a step has found and not yet solved, over one pair of convex parts: see [`ContactHooks::modify`].
+///
+/// ```
+/// use drystone::{Body, ContactHooks, PendingContact, PendingPoint, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::glam::Vec3;
+///
+/// /// Only the upper side of a platform holds.
+/// struct OneWay(usize);
+///
+/// impl ContactHooks for OneWay {
+///     fn modify(&mut self, _: &World, contact: &mut PendingContact) {
+///         let up = if contact.a.body.index() == self.0 { contact.normal.y } else { -contact.normal.y };
+///         if [contact.a, contact.b].iter().any(|side| side.body.index() == self.0) && up < 0.9 {
+///             contact.points_mut().iter_mut().for_each(|point: &mut PendingPoint| point.is_dropped = true);
+///         }
+///     }
+/// }
+///
+/// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+/// let platform = world.add(Body::fixed().shape(Shape::cuboid(2.0, 0.1, 2.0)));
+/// let ball = |y: f32| Body::dynamic().shape(Shape::ball(0.2)).position(0.0, y, y);
+/// let [rises, falls] = [(-1.0, 2.0), (1.0, -2.0)].map(|(y, v)| world.add(ball(y).velocity(Vec3::Y * v, Vec3::ZERO)));
+/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// simulation.set_hooks(Some(Box::new(OneWay(platform))));
+/// (0..60).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+/// assert!((simulation.world.bodies[rises].position.y - 1.0).abs() < 1e-3);
+/// assert!((simulation.world.bodies[falls].position.y - 0.3).abs() < 1e-3);
+/// # Ok::<(), drystone::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PendingContact {
+    /// The collider that the normal points away from.
+    pub a: ColliderOf,
+    /// The collider that the normal points to.
+    pub b: ColliderOf,
+    /// Unit normal from a to b, world axes. A change has no effect.
+    pub normal: Vec3,
+    /// Coulomb coefficient, 0 or more. The step fails if it is out of range.
+    pub friction: f32,
+    /// Ratio of separation to approach velocity, 0 to 1. The step fails if it is out of range.
+    pub restitution: f32,
+    points: [PendingPoint; MAX_POINTS],
+    count: usize,
+}
+
+/// One point of a [`PendingContact`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PendingPoint {
+    /// Midway between the surfaces (m). A change has no effect.
+    pub position: Vec3,
+    /// Distance along the normal, negative for overlap (m). A change has no effect.
+    pub separation: f32,
+    /// Whether the point takes no part in this step. A contact all of whose points are dropped does not touch.
+    pub is_dropped: bool,
+}
+
+impl PendingContact {
+    fn of(world: &World, pair: &Pair, manifold: &Manifold, material: Material) -> Self {
+        let bodies = [pair.body_a, pair.body_b];
+        let mut points = [PendingPoint::default(); MAX_POINTS];
+        for (point, found) in points.iter_mut().zip(manifold.points()) {
+            let at = |side: usize, anchor: Vec3| {
+                let body = &world.bodies[bodies[side] as usize];
+                body.position + body.rotation * anchor
+            };
+            let (on_a, on_b) = (at(0, found.anchor_a), at(1, found.anchor_b));
+            point.position = on_a.midpoint(on_b);
+            point.separation = (on_b - on_a).dot(manifold.normal);
+        }
+        let [a, b] = [0, 1].map(|side| collider_of(world, (bodies[side], pair.colliders[side])));
+        let Material { friction, restitution, .. } = material;
+        Self { a, b, normal: manifold.normal, friction, restitution, points, count: manifold.points().len() }
+    }
+
+    /// The contact points, 1 to 4.
+    pub fn points(&self) -> &[PendingPoint] {
+        &self.points[..self.count]
+    }
+
+    /// The same, to drop some.
+    pub fn points_mut(&mut self) -> &mut [PendingPoint] {
+        &mut self.points[..self.count]
+    }
+}
+
+/// The changes that hooks made in a step.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Modified {
+    /// Whether points were dropped.
+    pub points: bool,
+    /// Whether the material of a contact is another than in the step before.
+    pub materials: bool,
+}
+
+impl Stages {
+    /// Lets hooks change the contacts that take part in the step; without hooks, contacts get their own materials back.
+    ///
+    /// # Errors
+    /// A material is out of range.
+    pub(super) fn modify_contacts(
+        &mut self,
+        world: &World,
+        hooks: Option<&mut (dyn ContactHooks + 'static)>,
+    ) -> Result<Modified> {
+        let Self { detector, contacts, .. } = self;
+        let mut modified = Modified::default();
+        let Some(hooks) = hooks else {
+            modified.materials = contacts.forget_hooked();
+            return Ok(modified);
+        };
+        contacts.begin_hooked();
+        for place in detector.taking_part() {
+            let pair = detector.pair(place[0], place[1]);
+            let mut kept = Vec::new();
+            let mut is_reused = true;
+            for manifold in &pair.manifolds {
+                let bodies = [pair.body_a, pair.body_b];
+                let material = Body::contact_material(bodies.map(|i| &world.bodies[i as usize]), pair.colliders);
+                let mut contact = PendingContact::of(world, pair, manifold, material);
+                blaming(bodies, || hooks.modify(world, &mut contact));
+                let PendingContact { friction, restitution, .. } = contact;
+                let hooked = Material { friction, restitution, ..material };
+                hooked.check().map_err(|error| {
+                    let [a, b] = bodies.map(|i| world.name_of(i as usize));
+                    error.within(format_args!("the hooks, of the contact of {a} and {b}"))
+                })?;
+                modified.materials |= contacts.set_hooked(manifold.slot, Some(hooked).filter(|now| *now != material));
+                is_reused &= contacts.is_reused(manifold.slot);
+                kept.push(contact.points.map(|point| !point.is_dropped));
+            }
+            if kept.iter().zip(&pair.manifolds).any(|(kept, own)| kept[..own.points().len()].contains(&false)) {
+                detector.drop_points(place, &kept, is_reused);
+                modified.points = true;
+            }
+        }
+        if modified.points {
+            contacts.follow(world, detector);
+        }
+        Ok(modified)
+    }
+}

@@ -1,0 +1,212 @@
+//! Springs of a stiffness, and joints that are switched off, against closed forms.
+
+use std::f32::consts::TAU;
+
+use drystone::glam::{Quat, Vec3};
+use drystone::{Axis, Body, Joint, Shape, Simulation, SolverConfig, World};
+
+use crate::common::Open;
+use crate::common::state::{all_bits, reference};
+
+tests! {
+    every_backend {
+        a_damper_slows_a_mass_by_its_constant,
+        a_joint_that_is_off_holds_nothing_until_it_is_on,
+        a_spring_between_two_bodies_swings_with_their_reduced_mass,
+        a_spring_of_a_stiffness_swings_with_the_mass_that_it_moves,
+        a_torsion_spring_turns_a_rod_about_its_end,
+    }
+    no_gpu {
+        bodies_of_a_joint_that_is_off_collide_and_wake,
+        constants_out_of_range_are_refused,
+        springs_of_both_kinds_agree,
+    }
+}
+
+const DT: f32 = 1.0 / 240.0;
+
+fn simulation(world: World, open: Open) -> Simulation {
+    Simulation::new(world, SolverConfig::default().without_sleep(), open()).expect("a good world")
+}
+
+fn weightless() -> World {
+    World { gravity: Vec3::ZERO, ..World::new() }
+}
+
+fn cube(mass: f32) -> Body {
+    Body::dynamic().shape(Shape::cuboid(0.1, 0.1, 0.1)).total_mass(mass)
+}
+
+/// The mean time between two passages of zero upwards, of `measure` in 4 s (s).
+fn period(simulation: &mut Simulation, measure: impl Fn(&World) -> f32) -> f32 {
+    let (mut times, mut before) = (Vec::new(), measure(&simulation.world));
+    for step in 1..=960 {
+        simulation.step(DT).expect("a step");
+        let now = measure(&simulation.world);
+        if before < 0.0 && now >= 0.0 {
+            times.push((step as f32 - now / (now - before)) * DT);
+        }
+        before = now;
+    }
+    assert!(times.len() > 2, "{} passages", times.len());
+    (times[times.len() - 1] - times[0]) / (times.len() - 1) as f32
+}
+
+fn near(what: &str, measured: f32, exact: f32, share: f32) {
+    assert!((measured / exact - 1.0).abs() < share, "{what}: {measured}, not {exact}");
+}
+
+/// A mass that a slider leads along X, away from the place of its spring.
+fn on_a_slider(mass: f32, spring: Axis) -> World {
+    let mut world = weightless();
+    let body = world.add(cube(mass).position(0.2, 0.0, 0.0));
+    let slider = Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).along(Vec3::X);
+    world.join(slider.generic([spring, Axis::LOCKED, Axis::LOCKED], [Axis::LOCKED; 3]));
+    world
+}
+
+fn a_spring_of_a_stiffness_swings_with_the_mass_that_it_moves(open: Open) {
+    let stiffness = 100.0_f32;
+    for mass in [0.5_f32, 2.0, 8.0] {
+        let mut simulation =
+            simulation(on_a_slider(mass, Axis::FREE.spring_damper(0.0, stiffness, 0.0, f32::MAX)), open);
+        let measured = period(&mut simulation, |world| world.bodies[0].position.x);
+        near(&format!("period of {mass} kg"), measured, TAU * (mass / stiffness).sqrt(), 2e-3);
+    }
+}
+
+/// A weak spring and a strong damper: v decays as exp(-c t/m).
+fn a_damper_slows_a_mass_by_its_constant(open: Open) {
+    for (mass, damping) in [(2.0_f32, 3.0_f32), (8.0, 3.0), (2.0, 9.0)] {
+        let mut world = on_a_slider(mass, Axis::FREE.spring_damper(0.0, 1e-6, damping, f32::MAX));
+        world.bodies[0].linear_velocity = Vec3::X;
+        let mut simulation = simulation(world, open);
+        (0..120).for_each(|_| drop(simulation.step(DT).expect("a step")));
+        let speed = simulation.world.bodies[0].linear_velocity.x;
+        near(&format!("{mass} kg, {damping} N s/m"), speed, (-damping * 0.5 / mass).exp(), 0.01);
+    }
+}
+
+/// A rod of 1 m and 2 kg on a hinge at its end: its inertia there and not the one about its center counts; and it hangs
+/// askew by its weight.
+fn a_torsion_spring_turns_a_rod_about_its_end(open: Open) {
+    let stiffness = 30.0;
+    let rod = |turned: f32| {
+        let turn = Quat::from_rotation_z(turned);
+        let center = turn * Vec3::X * 0.5;
+        let rod = Body::dynamic().shape(Shape::cuboid(0.5, 0.02, 0.02)).total_mass(2.0).rotation(turn);
+        rod.position(center.x, center.y, center.z)
+    };
+    let hinge = |body: usize, damping: f32| {
+        let hinge = Joint::to_world(body, Vec3::X * -0.5, Vec3::ZERO).hinge(Vec3::Z);
+        hinge.spring_damper(0.0, stiffness, damping)
+    };
+    let angle = |world: &World| world.joint_motion(&world.joints[0]).position[3];
+    let mut world = weightless();
+    let body = world.add(rod(0.1));
+    world.join(hinge(body, 0.0));
+    let mut free = simulation(world, open);
+    let inertia = 2.0 * ((1.0 + 0.04_f32.powi(2)) / 12.0 + 0.25);
+    near("period", period(&mut free, angle), TAU * (inertia / stiffness).sqrt(), 4e-3);
+
+    let mut world = World::new();
+    let body = world.add(rod(0.0));
+    world.join(hinge(body, 5.0));
+    let mut hanging = simulation(world, open);
+    (0..1200).for_each(|_| drop(hanging.step(DT).expect("a step")));
+    let turned = angle(&hanging.world);
+    near("torque", -stiffness * turned, 2.0 * 9.81 * 0.5 * turned.cos(), 0.01);
+}
+
+fn a_spring_between_two_bodies_swings_with_their_reduced_mass(open: Open) {
+    let (stiffness, masses) = (60.0_f32, [1.0_f32, 3.0]);
+    let mut world = weightless();
+    let [a, b] = [0, 1].map(|k| world.add(cube(masses[k]).position(1.2 * k as f32, 0.0, 0.0)));
+    let spring = Axis::FREE.spring_damper(1.0, stiffness, 0.0, f32::MAX);
+    world.join(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).at_distance(spring));
+    let mut simulation = simulation(world, open);
+    let reduced = masses[0] * masses[1] / (masses[0] + masses[1]);
+    let measured = period(&mut simulation, |world| world.bodies[1].position.x - world.bodies[0].position.x - 1.0);
+    near("period", measured, TAU * (reduced / stiffness).sqrt(), 2e-3);
+    assert!(simulation.world.linear_momentum().length() < 1e-4);
+}
+
+/// On one mass, frequency and ratio say the same as stiffness and damping.
+fn springs_of_both_kinds_agree() {
+    let (mass, frequency, ratio) = (3.0_f32, 2.0_f32, 0.2_f32);
+    let omega = TAU * frequency;
+    let (stiffness, damping) = (mass * omega * omega, 2.0 * ratio * omega * mass);
+    let run = |spring: Axis| {
+        let mut simulation = simulation(on_a_slider(mass, spring), reference);
+        (0..100).for_each(|_| drop(simulation.step(DT).expect("a step")));
+        simulation.world.bodies[0].position.x
+    };
+    let [one, other] =
+        [Axis::FREE.spring(0.0, frequency, ratio, 25.0), Axis::FREE.spring_damper(0.0, stiffness, damping, 25.0)]
+            .map(run);
+    assert!((one - other).abs() < 1e-5 && one.abs() > 1e-3, "{one} m, {other} m");
+}
+
+fn constants_out_of_range_are_refused() {
+    let line = |stiffness: f32, damping: f32| {
+        let world = on_a_slider(1.0, Axis::FREE.spring_damper(0.0, stiffness, damping, f32::MAX));
+        world.check().expect_err("out of range").to_string()
+    };
+    assert_eq!(line(0.0, 0.0), "joint 0: linear: stiffness = 0: must be above 0 and at most 1e30");
+    assert_eq!(line(f32::NAN, 0.0), "joint 0: linear: stiffness = NaN: must be above 0 and at most 1e30");
+    assert_eq!(line(1.0, -1.0), "joint 0: linear: damping = -1: must be 0 to 1e30");
+}
+
+fn a_joint_that_is_off_holds_nothing_until_it_is_on(open: Open) {
+    let world = |joint: Option<bool>| {
+        let mut world = World::new();
+        let body = world.add(cube(2.0).velocity(Vec3::X, Vec3::Z));
+        if let Some(enabled) = joint {
+            world.join(
+                Joint::to_world(body, Vec3::Y * 0.3, Vec3::Y * 0.3).hinge(Vec3::Z).motor(1.0, 50.0).enabled(enabled),
+            );
+        }
+        world
+    };
+    let [mut off, mut none] = [Some(false), None].map(|joint| simulation(world(joint), open));
+    for _ in 0..60 {
+        off.step(DT).expect("a step");
+        none.step(DT).expect("a step");
+        assert_eq!(all_bits(&off.world), all_bits(&none.world));
+    }
+    let hinge = off.world.joints.handles()[0];
+    assert_eq!((off.joint_force(hinge), off.joint_torque(hinge)), (Some(Vec3::ZERO), Some(Vec3::ZERO)));
+    assert_eq!(off.world.joint_gap(), 0.0);
+    // On, it catches the body where it is.
+    let body = &off.world.bodies[0];
+    let anchor = body.position + body.rotation * (Vec3::Y * 0.3);
+    (off.world.joints[0].enabled, off.world.joints[0].anchor_b) = (true, anchor);
+    (0..240).for_each(|_| drop(off.step(DT).expect("a step")));
+    assert!(off.world.joint_gap() < 1e-3 && off.world.bodies[0].position.distance(anchor) < 0.301);
+    assert!(off.joint_force(hinge).is_some_and(|force| force.length() > 1.0));
+    off.world.joints[0].enabled = false;
+    let height = off.world.bodies[0].position.y;
+    (0..60).for_each(|_| drop(off.step(DT).expect("a step")));
+    assert!(off.world.bodies[0].position.y < height - 0.2);
+}
+
+/// Two cubes one on the other, whose weld keeps them from colliding; off, the upper one lies on the lower one.
+fn bodies_of_a_joint_that_is_off_collide_and_wake() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let [low, high] = [0.1, 0.25].map(|y| world.add(cube(1.0).position(0.0, y, 0.0)));
+    world.join(Joint::new(high, Vec3::ZERO, low, Vec3::Y * 0.15).fixed());
+    let mut simulation = Simulation::new(world, SolverConfig::default(), reference()).expect("a good world");
+    let steps = |simulation: &mut Simulation| (0..480).for_each(|_| drop(simulation.step(DT).expect("a step")));
+    steps(&mut simulation);
+    assert!(simulation.is_asleep(high) && (simulation.world.bodies[high].position.y - 0.25).abs() < 1e-3);
+    simulation.world.joints[0].enabled = false;
+    simulation.step(DT).expect("a step");
+    assert!(!simulation.is_asleep(high));
+    steps(&mut simulation);
+    assert!(
+        (simulation.world.bodies[high].position.y - 0.3).abs() < 2e-3,
+        "{}",
+        simulation.world.bodies[high].position
+    );
+}
