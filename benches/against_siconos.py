@@ -67,7 +67,7 @@ class Problem:
         self.rho = 3.0 / self.delassus.diagonal().reshape(-1, 3).sum(axis=1)
 
     def error(self, r):
-        """e_vel, as drystone::residuals defines it."""
+        """e_vel, as drystone_problems::residuals defines it."""
         u = (self.delassus @ r + self.q).reshape(-1, 3)
         r, mu = r.reshape(-1, 3), self.mu
         x = r - self.rho[:, None] * u

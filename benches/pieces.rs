@@ -9,14 +9,15 @@ use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::plan::{Kernel, Pass};
 
 use drystone::stages::problem::{ContactRows, JointRows, begin, lay_out};
-use drystone::{Backend, BodyKind, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::{Backend, BodyKind, Cpu, Reference, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone_scenes::Scene;
 
 /// Sweeps of a kernel in one run, so that taking the rows over hardly counts.
 const SWEEPS: usize = 50;
 
 fn settled(scene: &str, config: SolverConfig) -> (Simulation, f32) {
     let scene = Scene::find_spec(scene).expect("a scene of the catalogue");
-    let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("good settings");
+    let mut simulation = Simulation::with(scene.world, config, Box::new(Cpu::new())).expect("good settings");
     for _ in 0..240 {
         simulation.step(scene.dt).expect("the processor runs anywhere");
     }

@@ -21,7 +21,7 @@ fn main() -> Result<()> {
         .shape_at(Shape::cylinder(0.6, 0.1), Vec3::ZERO, across);
     world.add(dumbbell.position(0.0, 2.0, 2.0).friction(0.8).named("dumbbell"));
 
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     for _ in 0..180 {
         simulation.step(1.0 / 60.0)?;
     }

@@ -3,7 +3,8 @@
 //!     cargo run --release --example choose_backend -- gpu
 
 use drystone::backend::{BackendChoice, choose};
-use drystone::{Result, Scene, Simulation, SolverConfig};
+use drystone::{Result, Simulation, SolverConfig};
+use drystone_scenes::Scene;
 
 fn main() -> Result<()> {
     let name = std::env::args().nth(1).unwrap_or_else(|| "auto".into());
@@ -12,7 +13,7 @@ fn main() -> Result<()> {
     let scene = Scene::find("pile", &["n=200".into()])?;
     let (backend, why) = choose(choice, scene.world.dynamic_count(), false)?;
     println!("{why}");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), backend)?;
+    let mut simulation = Simulation::with(scene.world, SolverConfig::default(), backend)?;
     for _ in 0..60 {
         let stats = simulation.step(scene.dt)?;
         if let Some(body) = stats.first_non_finite {

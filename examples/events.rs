@@ -3,7 +3,7 @@
 //!     cargo run --release --example events
 
 use drystone::glam::Vec3;
-use drystone::{Body, Cpu, Event, Listen, Result, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Event, Listen, Result, Shape, Simulation, World};
 
 pub fn main() -> Result<()> {
     let mut world = World::new();
@@ -16,7 +16,7 @@ pub fn main() -> Result<()> {
             Body::dynamic().shape(Shape::ball(0.1)).position(x, 2.0 + 0.4 * i as f32, z).velocity(velocity, Vec3::ZERO),
         );
     }
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new()))?;
+    let mut simulation = Simulation::new(world)?;
     simulation.listen(Listen { contacts: true, hits_above: Some(2.0), ..Listen::default() })?;
     let mut count = 0;
     for step in 0..240 {

@@ -40,7 +40,7 @@ pub fn run(print: &mut dyn FnMut(String)) -> Result<()> {
         ball.velocity(Vec3::Y * speed, Vec3::ZERO)
     };
     let balls: Vec<BodyHandle> = [3.0, 6.0, 9.0].map(|speed| world.insert(throw(speed))).into();
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     simulation.set_hooks(Some(Box::new(OneWay { platform })));
     for _ in 0..180 {
         simulation.step(1.0 / 60.0)?;

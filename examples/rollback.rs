@@ -4,7 +4,7 @@
 //!     cargo run --release --example rollback
 
 use drystone::glam::Vec3;
-use drystone::{Body, Cpu, Result, Rollback, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Result, Rollback, Shape, Simulation, World};
 
 const DT: f32 = 1.0 / 60.0;
 /// Steps that a push of the second player is late.
@@ -17,7 +17,7 @@ fn game() -> Result<Simulation> {
         let place = Vec3::new((i % 2) as f32 * 3.0, 0.5 + (i / 2) as f32, 0.0);
         world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(place.x, place.y, place.z));
     }
-    Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new()))
+    Simulation::new(world)
 }
 
 /// Which body a player pushes in a step, if any.

@@ -3,7 +3,7 @@
 //!     cargo run --release --example server_loop
 
 use drystone::glam::Vec3;
-use drystone::{Body, BodyHandle, Cpu, Result, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Result, Shape, Simulation, World};
 
 /// Length of a step (s).
 const STEP: f32 = 1.0 / 60.0;
@@ -32,7 +32,7 @@ pub fn run(steps: u32, mut send: impl FnMut(String)) -> Result<()> {
     let puck =
         |x: f32| Body::dynamic().shape(Shape::cylinder(0.2, 0.5)).total_mass(10.0).position(x, 0.2, 0.0).friction(0.3);
     let players: Vec<BodyHandle> = [-3.0, 3.0].map(|x| world.insert(puck(x))).into();
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new()))?;
+    let mut simulation = Simulation::new(world)?;
 
     let (mut time, mut step) = (0.0, 0);
     for round in 0.. {

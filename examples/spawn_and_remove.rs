@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 
 use drystone::glam::Vec3;
-use drystone::{Body, BodyHandle, Cpu, Result, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Result, Shape, Simulation, World};
 
 /// Balls that live at the same time.
 const MOST: usize = 120;
@@ -17,7 +17,7 @@ fn main() -> Result<()> {
 pub fn run(mut print: impl FnMut(String)) -> Result<()> {
     let mut world = World::new();
     world.add(Body::fixed().shape(Shape::cuboid(4.0, 0.5, 4.0)).position(0.0, -0.5, 0.0).named("basin"));
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new()))?;
+    let mut simulation = Simulation::new(world)?;
     let mut balls: VecDeque<BodyHandle> = VecDeque::new();
     for step in 0..480 {
         let angle = 2.4 * step as f32;

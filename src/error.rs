@@ -82,13 +82,15 @@ fn one_line(text: impl std::fmt::Display) -> String {
 }
 
 /// An [`Error::Input`] with a text, like `format!`.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! input {
-    ($($text:tt)*) => { $crate::error::Error::Input(format!($($text)*)) };
+    ($($text:tt)*) => { $crate::Error::Input(format!($($text)*)) };
 }
-pub(crate) use input;
+pub use input;
 
 /// Returns the caller's input error with a message unless a condition holds.
-pub(crate) fn ensure(holds: bool, message: impl FnOnce() -> String) -> Result<()> {
+pub fn ensure(holds: bool, message: impl FnOnce() -> String) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::Input(message())) }
 }
 

@@ -18,7 +18,7 @@
 //!
 //! | To | call |
 //! |---|---|
-//! | build a world | [`World`], [`Body`], [`Shape`], [`Joint`]; or find a [`Scene`] of the catalogue or a file |
+//! | build a world | [`World`], [`Body`], [`Shape`], [`Joint`]; or find a scene of the catalogue or a file in `drystone-scenes` |
 //! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
 //! | choose a backend for the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
@@ -28,16 +28,17 @@
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
 //! | get events of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
 //! | measure overlap, speed, drift | [`metrics`] |
-//! | check an adapter and its driver | `conform` |
-//! | solve one problem without poses | [`ContactProblem`], [`Solver`](solver::Solver), [`Residuals`](residuals::Residuals) |
+//! | record a run and replay it | `drystone-scenes` |
+//! | solve one problem without poses, measure residuals | `drystone-problems` |
+//! | compare backends, check an adapter and its driver | `drystone-conform` |
 //!
 //! The stages one by one, which tests and measurements need, are in [`stages`].
 //!
 //! # Features
 //!
 //! - `gpu`, the default: the backend on compute shaders. Without it no crate of wgpu is built.
-//! - `serde`: scene files, their JSON Schema; settings serialize and deserialize, results serialize.
-//! - `fclib`: contact problems in FCLIB's HDF5 files.
+//! - `serde`: settings serialize and deserialize, results serialize.
+//! - `schema`: the JSON Schema of settings.
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
@@ -45,11 +46,7 @@
 pub mod backend;
 pub mod batch;
 mod collide;
-mod compare;
 pub mod config;
-#[cfg(feature = "gpu")]
-pub mod conform;
-pub mod contacts;
 mod effort;
 mod energy;
 mod error;
@@ -67,14 +64,10 @@ pub mod preset;
 mod problem;
 pub mod queries;
 mod random;
-mod recording;
-pub mod residuals;
 mod rest;
 mod saved;
-pub mod scenes;
 mod simulation;
 mod sleep;
-pub mod solver;
 pub mod stages;
 pub mod stats;
 mod suggest;
@@ -85,13 +78,10 @@ pub use backend::cpu::{Cpu, Reference};
 #[cfg(feature = "gpu")]
 pub use backend::gpu::Gpu;
 pub use config::SolverConfig;
-pub use contacts::ContactProblem;
 pub use error::{Error, Result};
 pub use glam;
 pub use plan::StepPlan;
 pub use problem::StepProblem;
-pub use recording::{Recorder, RecordingIntervals, Replay, ReplayDifference};
-pub use scenes::Scene;
 pub use simulation::{
     ColliderOf, Contact, ContactHooks, ContactPoint, Event, Hit, Listen, PendingContact, PendingPoint, Rollback,
     Simulation, Snapshot, SolvedManifold, SolvedPoint, Summed,

@@ -7,6 +7,7 @@ mod contacts;
 mod events;
 mod hash;
 mod hooks;
+pub(crate) mod input;
 mod manifolds;
 mod rollback;
 mod saved;
@@ -14,18 +15,16 @@ mod stages;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::backend::cpu::Reference;
+use crate::backend::cpu::Cpu;
 use crate::backend::{Backend, CheckedStep};
 use crate::config::{SolverConfig, check_step_length};
-use crate::contacts::ContactProblem;
 use crate::error::{Error, Result};
 use crate::metrics::Penetration;
 use crate::panics::{self, Panic};
-use crate::plan::{Kernel, Pass, StepPlan};
+use crate::plan::StepPlan;
+use crate::problem::StepProblem;
 use crate::problem::carry::Carry;
-use crate::problem::{ContactRow, StepProblem};
 use crate::queries::Queries;
-use crate::residuals::Residuals;
 use crate::stats::{StepStats, Stopwatch, timed};
 #[cfg(doc)]
 use crate::world::Body;
@@ -34,7 +33,7 @@ use stages::{Changes, Stages};
 
 pub use contacts::{Contact, ContactPoint};
 pub use events::{ColliderOf, Event, Hit, Listen};
-pub(crate) use hash::hashes;
+pub use hash::hashes;
 pub use hooks::{ContactHooks, PendingContact, PendingPoint};
 pub use manifolds::{SolvedManifold, SolvedPoint, Summed};
 pub use rollback::Rollback;
@@ -57,7 +56,7 @@ struct Unfinished {
 /// let mut world = World::new();
 /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
 /// let brick = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
-/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// for _ in 0..60 {
 ///     simulation.step(1.0 / 60.0)?;
 /// }
@@ -73,7 +72,7 @@ struct Unfinished {
 /// let brick = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
 /// let lamp = world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0).position(3.0, 2.0, 0.0));
 /// world.join(Joint::to_world(lamp, Vec3::Y, Vec3::new(3.0, 3.0, 0.0)).hinge(Vec3::Z));
-/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// assert!(simulation.listening().impulses);
 /// for _ in 0..60 {
@@ -131,11 +130,19 @@ fn next_state() -> u64 {
 }
 
 impl Simulation {
-    /// A simulation of `world` before its first step.
+    /// A simulation of `world` before its first step, with the default settings on the CPU.
+    ///
+    /// # Errors
+    /// [`World::check`] refuses the world.
+    pub fn new(world: World) -> Result<Self> {
+        Self::with(world, SolverConfig::default(), Box::new(Cpu::new()))
+    }
+
+    /// The same, with settings and a backend of the caller.
     ///
     /// # Errors
     /// A setting is out of range or contradicts another, or [`World::check`] refuses the world.
-    pub fn new(mut world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
+    pub fn with(mut world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         config.check()?;
         world.check()?;
         world.raise_inertias();
@@ -188,7 +195,7 @@ impl Simulation {
     ///
     /// let mut world = World::new();
     /// let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// pollster::block_on(simulation.step_async(0.01))?;
     /// assert!(simulation.world.bodies[ball].linear_velocity.y < -0.09);
     /// # Ok::<(), drystone::Error>(())
@@ -232,7 +239,7 @@ impl Simulation {
     ///
     /// impl ContactHooks for Idle {}
     ///
-    /// let mut simulation = Simulation::new(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.set_hooks(Some(Box::new(Idle)));
     /// simulation.step(1.0 / 60.0)?;
     /// simulation.set_hooks(None);
@@ -270,7 +277,7 @@ impl Simulation {
     /// let mut world = World::new();
     /// let floor = world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 1.0, 0.0));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.listen(Listen { contacts: true, hits_above: Some(1.0), ..Listen::default() })?;
     /// let mut told = Vec::new();
     /// for _ in 0..60 {
@@ -284,93 +291,6 @@ impl Simulation {
     /// ```
     pub fn events(&self) -> &[Event] {
         &self.stages.events.all
-    }
-
-    /// Advances the world by `dt` seconds, and returns the contact problem that the first substep solved:
-    /// [`ContactProblem::of_step`]. The problem has no contacts if no awake body touches another.
-    ///
-    /// ```
-    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
-    /// # let mut world = World::new();
-    /// # world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
-    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
-    /// let (problem, _) = simulation.step_with_contacts("a ball", 1.0 / 60.0)?;
-    /// assert_eq!((problem.name.as_str(), problem.contacts.len()), ("a ball", 1));
-    /// # Ok::<(), drystone::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// Those of [`Simulation::step`]; or the world has joints, which a contact problem cannot have.
-    pub fn step_with_contacts(&mut self, name: &str, dt: f32) -> Result<(ContactProblem, StepStats)> {
-        if !self.world.joints.is_empty() {
-            let joints = self.world.joints.len();
-            return Err(Error::input(format!("{name} has {joints} joints: a contact problem cannot have joints")));
-        }
-        if let Some(i) = self.world.bodies.iter().position(|body| body.has_locked_rotation()) {
-            let body = self.world.name_of(i);
-            return Err(Error::input(format!("{body} has locked rotations: a body of a contact problem turns freely")));
-        }
-        self.on_device = false;
-        let mut stats = StepStats::default();
-        if !self.begin_step(dt, &mut stats)? {
-            return Ok((ContactProblem { name: name.into(), ..ContactProblem::default() }, stats));
-        }
-        use Kernel::{
-            BeginChanges, DampVelocities, EndChanges, IntegrateGyroscopic, IntegrateTorques, IntegrateVelocities,
-        };
-        let forces = |p: &&Pass| {
-            let Pass { kernel, .. } = p;
-            matches!(
-                kernel,
-                BeginChanges
-                    | IntegrateVelocities { .. }
-                    | IntegrateTorques { .. }
-                    | DampVelocities { .. }
-                    | IntegrateGyroscopic { .. }
-            )
-        };
-        let blocks = self.stages.plan.passes.chunk_by(|p, q| p.block == q.block);
-        let first: Vec<_> = blocks
-            .flat_map(|own| own.iter().take_while(forces).chain(own.iter().filter(|p| p.kernel == EndChanges)))
-            .cloned()
-            .collect();
-        let mut problem = self.stages.problem.clone();
-        Reference::<f32>::new().run(&mut problem, &first)?;
-        let contacts = ContactProblem::of_step(name.into(), &problem);
-        self.end_step(dt, &mut stats)?;
-        Ok((contacts, stats))
-    }
-
-    /// Moves the world by `dt` seconds and returns the residuals of the impulses after the first substep, which
-    /// [`Reference`] computes a second time. They are zero if no awake bodies touch.
-    ///
-    /// ```
-    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
-    /// # let mut world = World::new();
-    /// # world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
-    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
-    /// assert!(simulation.step_with_residuals(1.0 / 60.0)?.e_vel < 1e-3);
-    /// # Ok::<(), drystone::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`Simulation::step_with_contacts`].
-    pub fn step_with_residuals(&mut self, dt: f32) -> Result<Residuals> {
-        let (mut problem, plan) = self.next_problem(dt)?;
-        let begins = |p: &Pass| matches!(p.kernel, Kernel::IntegrateVelocities { .. });
-        let end = plan.passes.iter().skip(1).position(begins).map_or(plan.passes.len(), |i| i + 1);
-        Reference::<f32>::new().run(&mut problem, &plan.passes[..end])?;
-        let of_contact = |row: &ContactRow| {
-            let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
-            problem.impulses[own].iter().map(|i| glam::Vec3::new(i.normal, i.tangent_1, i.tangent_2).as_dvec3())
-        };
-        let mut impulses: Vec<_> = problem.swept_contacts().flat_map(of_contact).collect();
-        let (contacts, _) = self.step_with_contacts("the world", dt)?;
-        // A step in which all bodies sleep has no impulses.
-        impulses.truncate(contacts.contacts.len());
-        Ok(Residuals::of(&contacts, &impulses))
     }
 
     /// The caller's changes since the last step.
@@ -540,7 +460,7 @@ impl Simulation {
     /// let mut world = World::new();
     /// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.step(1.0 / 60.0)?;
     /// let hit = simulation.queries().ray(Vec3::new(-5.0, 0.5, 0.0), Vec3::X, 10.0, &Filter::default()).expect("the ball");
     /// assert_eq!(hit.body, ball);
@@ -613,7 +533,7 @@ impl Simulation {
     /// let mut world = World::new();
     /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
     /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
     /// for _ in 0..20 {
     ///     simulation.step(1.0 / 60.0)?;
@@ -652,7 +572,7 @@ impl Simulation {
     /// let beam = Body::dynamic().shape(Shape::cuboid(0.5, 0.05, 0.05)).total_mass(2.0);
     /// let beam = world.add(beam.position(0.5, 0.0, 0.0));
     /// let weld = world.insert_joint(Joint::new(wall, Vec3::ZERO, beam, Vec3::X * -0.5).fixed());
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// assert_eq!(simulation.joint_force(weld), None);
     /// (0..120).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
     /// // The wall bears the weight of 2 kg at 0.5 m.

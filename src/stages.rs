@@ -1,4 +1,4 @@
-//! The stages of a step, and code that the command shares with the library.
+//! The stages of a step, and code that the other packages share with the engine.
 //!
 //! Tests, measurements and backends need these parts. A program that steps a [`Simulation`](crate::Simulation) does not
 //! need them. They change from version to version.
@@ -20,6 +20,7 @@ pub mod graph {
 
 /// A step as a value: plain rows.
 pub mod problem {
+    pub use crate::problem::arithmetic::tangent_mass;
     pub use crate::problem::*;
 }
 
@@ -42,6 +43,8 @@ pub mod math {
 pub mod backend {
     pub use crate::backend::calibrate::crossover;
     pub use crate::backend::checked::CheckedStep;
+    #[cfg(feature = "gpu")]
+    pub use crate::backend::gpu::blocking::block_on;
     pub use crate::lanes::{InstructionSet, Lanes, WIDTH, Work};
 
     /// The compute shaders: texts, buffers, layouts.
@@ -63,26 +66,22 @@ pub mod random {
     pub use crate::random::SplitMix64;
 }
 
-/// Compares two backends on the same scene.
-pub mod compare {
-    pub use crate::compare::*;
+/// The caller's part in a run, and hashes: for recordings.
+pub mod input {
+    pub use crate::saved::hash_of;
+    pub use crate::simulation::hashes;
+    pub use crate::simulation::input::{InputReader, InputWriter, StepInput};
 }
 
-/// The parts of [`conform`](crate::conform) that tests share: random problems, all kernels, differences.
-#[cfg(feature = "gpu")]
-pub mod conform {
-    /// Differences of worlds and rows.
-    pub mod difference {
-        pub use crate::conform::difference::*;
-    }
-    /// Every kernel, in one pass each.
-    pub mod passes {
-        pub use crate::conform::passes::*;
-    }
-    /// Random problems.
-    pub mod random {
-        pub use crate::conform::random::*;
-    }
+/// One-line refusals.
+pub mod error {
+    pub use crate::error::{ensure, input};
+    pub use crate::panics::text_of;
+}
+
+/// Poses of shapes.
+pub mod world {
+    pub use crate::world::shape::{placed, pose};
 }
 
 /// Checks whether a request fits into memory.

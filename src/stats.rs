@@ -9,10 +9,11 @@ use web_time::Instant;
 /// Times and counts of one step.
 ///
 /// ```
-/// use drystone::{Reference, Scene, Simulation, SolverConfig, StepStats};
+/// use drystone::{Reference, Simulation, SolverConfig, StepStats};
+/// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &[])?;
-/// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let stats: StepStats = simulation.step(scene.dt)?;
 /// assert_eq!((stats.manifolds, stats.points, stats.asleep, stats.first_non_finite), (10, 40, 0, None));
 /// assert!(stats.colors >= 2 && stats.overflow == 0);
@@ -79,9 +80,10 @@ pub const EFFORT_CLASSES: usize = 13;
 /// The contact that needs the most substeps.
 ///
 /// ```
-/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
@@ -106,9 +108,10 @@ pub struct HardestContact {
 /// Time of a device at one kernel in one step.
 ///
 /// ```
-/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
@@ -132,9 +135,10 @@ pub struct KernelTime {
 /// The bytes and dispatches of a step between the processor and a device.
 ///
 /// ```
-/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
@@ -161,9 +165,10 @@ pub struct Traffic {
 /// Wall time of each stage of a step. It is zero in a browser, because WebAssembly has no clock.
 ///
 /// ```
-/// # use drystone::{Reference, Scene, Simulation, SolverConfig};
+/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;

@@ -1,7 +1,7 @@
 //! The threads that a process begins in its first step. The only test of this process: threads of another one would count, too.
 #![cfg(target_os = "linux")]
 
-use drystone::{Body, Cpu, Shape, Simulation, SolverConfig, World, glam::Vec3};
+use drystone::{Body, Shape, Simulation, World, glam::Vec3};
 
 /// The threads of this process.
 fn threads() -> usize {
@@ -15,8 +15,7 @@ fn the_first_step_of_a_process_begins_no_thread() {
     for i in 0..10 {
         world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
     }
-    let mut simulation =
-        Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a world that can be simulated");
+    let mut simulation = Simulation::new(world).expect("a world that can be simulated");
     let begun = threads();
     simulation.step(1.0 / 60.0).expect("a step");
     assert_eq!(threads(), begun, "threads began in the first step");

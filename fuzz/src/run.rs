@@ -39,7 +39,7 @@ impl Runs {
     /// Returns `None` if the world or the settings are refused. All variants must refuse them with the same line.
     pub fn new(world: &World, config: &SolverConfig) -> Option<Self> {
         let begun =
-            |way: &Way| (way.pool)().install(|| Simulation::new(world.clone(), config.clone(), (way.backend)()));
+            |way: &Way| (way.pool)().install(|| Simulation::with(world.clone(), config.clone(), (way.backend)()));
         let simulations: Vec<_> = agreed(WAYS.iter().map(begun).collect())?;
         Some(Self { simulations })
     }

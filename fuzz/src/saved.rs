@@ -1,6 +1,7 @@
 //! Saved states and recordings with damage that their hash does not reveal.
 
-use drystone::{Cpu, Recorder, RecordingIntervals, Replay, Scene, Simulation, SolverConfig};
+use drystone::{Cpu, Simulation};
+use drystone_scenes::{Recorder, RecordingIntervals, Replay, Scene};
 
 use crate::borne;
 
@@ -53,7 +54,7 @@ pub fn state(data: &[u8]) {
 
 fn begun(spec: &str, steps: usize) -> Simulation {
     let scene = Scene::find_spec(spec).expect("a scene");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("a world");
+    let mut simulation = Simulation::new(scene.world).expect("a world");
     (0..steps).for_each(|_| drop(simulation.step(scene.dt).expect("a step")));
     simulation
 }

@@ -4,15 +4,16 @@ use std::io::Write;
 use std::path::Path;
 
 use drystone::config::Method;
-use drystone::contacts::Problem;
-use drystone::residuals::Residuals;
-use drystone::scenes::{CATALOGUE, SceneFile};
-use drystone::solver::{Order, Solver};
-use drystone::{ContactProblem, Cpu, Scene, Simulation, SolverConfig};
+use drystone::{Cpu, Simulation, SolverConfig};
 use drystone_cli::report::Shard;
 use drystone_cli::report::bench::{self, Bench};
 use drystone_cli::report::comparison::{self, Extent, Origin, Report, Survey};
 use drystone_maze::{Map, Script};
+use drystone_problems::ContactProblem;
+use drystone_problems::contacts::Problem;
+use drystone_problems::residuals::Residuals;
+use drystone_problems::solver::{Order, Solver};
+use drystone_scenes::{CATALOGUE, Scene, SceneFile};
 
 use crate::good;
 
@@ -41,7 +42,7 @@ pub fn scene(data: &[u8]) {
         return;
     }
     let config = SolverConfig::default().with(|c| c.max_substeps = 16);
-    let Some(mut simulation) = good(Simulation::new(scene.world, config, Box::new(Cpu::new()))) else { return };
+    let Some(mut simulation) = good(Simulation::with(scene.world, config, Box::new(Cpu::new()))) else { return };
     for _ in 0..4 {
         let Some(stats) = good(simulation.step(scene.dt)) else { return };
         assert_eq!(stats.first_non_finite, simulation.world.first_non_finite());
@@ -102,12 +103,11 @@ fn small_problems() -> Vec<ContactProblem> {
     let after = |name: &str, parameters: &[&str], steps: usize| {
         let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
         let scene = Scene::find(name, &parameters).expect("a scene");
-        let mut simulation =
-            Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("a world");
+        let mut simulation = Simulation::new(scene.world).expect("a world");
         for _ in 0..steps {
             simulation.step(scene.dt).expect("a step");
         }
-        simulation.step_with_contacts(name, scene.dt).expect("a step").0
+        drystone_problems::step_with_contacts(&mut simulation, name, scene.dt).expect("a step").0
     };
     vec![after("tower", &["n=2"], 3), after("slide", &[], 3), after("pile", &["n=4"], 60)]
 }

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 use glam::{Quat, Vec2, Vec3};
 
 use crate::map::{Cell, Map};
-use drystone::{Body, Result, Scene, Shape, World};
+use drystone::{Body, Result, Shape, World};
+use drystone_scenes::Scene;
 
 // Side of a cell, radii of ball and hole, height of the walls, and depth of the holes (m).
 pub const CELL: f32 = 0.06;

@@ -6,7 +6,8 @@ use serde::Serialize;
 use crate::board::{BALL, BOARD, CELL, RADIUS, center_of, gap, scene};
 use crate::map::Map;
 use crate::script::{Script, TILT_LIMIT};
-use drystone::{Backend, Result, Scene, Simulation, SolverConfig, World};
+use drystone::{Backend, Result, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 /// Rate of the tilt (degrees/s).
 const TILT_RATE: f32 = 60.0;
@@ -88,7 +89,7 @@ pub struct Game {
 
 impl Game {
     pub fn new(map: Map, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
-        Self::with(map, |scene| Ok(Box::new(Simulation::new(scene.world, config, backend)?)))
+        Self::with(map, |scene| Ok(Box::new(Simulation::with(scene.world, config, backend)?)))
     }
 
     /// A game with the engine that `build` makes for its scene.

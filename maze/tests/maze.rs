@@ -89,7 +89,7 @@ fn roll_over(floor: Body) -> (f32, f32) {
     let ball = world.add(Body::dynamic().density(7800.0).shape(Shape::ball(RADIUS)));
     world.bodies[ball].position = tilt * Vec3::new(-0.97, RADIUS, -0.97);
     let mut simulation =
-        Simulation::new(world, SolverConfig::default().without_sleep(), reference()).expect("a simulation");
+        Simulation::with(world, SolverConfig::default().without_sleep(), reference()).expect("a simulation");
     let up = tilt * Vec3::Y;
     let (mut hop, mut slip) = (0.0_f32, 0.0_f32);
     for step in 0..240 {

@@ -3,10 +3,11 @@
 use std::cell::RefCell;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use drystone::batch::{Column, Contacts, Measure, Member, Run, write};
+use drystone::batch::{Column, Contacts, Member, Run, write};
 use drystone::glam::Vec3;
 use drystone::queries::Filter;
-use drystone::{Listen, Result as Outcome, World};
+use drystone::{Listen, Result as Outcome, SolverConfig, World};
+use drystone_problems::batch::Measure;
 use drystone_view::Look;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{
@@ -103,8 +104,15 @@ impl Batch {
         let all: Vec<_> =
             scenes.iter().zip(&configs).map(|(scene, config)| (&scene.get().0, &config.get().0)).collect();
         made(py, threads, || match all[..] {
-            [(scene, config)] => drystone::batch::Batch::of(scene, config, count),
-            _ => drystone::batch::Batch::new(all.iter().map(|(scene, config)| (&***scene, *config))),
+            [(scene, config)] => drystone::batch::Batch::of(scene.constant_world()?, scene.dt, config, count),
+            _ => {
+                let mut worlds = Vec::new();
+                for (k, (scene, config)) in all.iter().enumerate() {
+                    let world = scene.constant_world().map_err(|error| error.within(format_args!("world {k}")))?;
+                    worlds.push((world, scene.dt, SolverConfig::clone(config)));
+                }
+                drystone::batch::Batch::new(worlds)
+            }
         })
     }
 
@@ -329,7 +337,7 @@ impl Batch {
         let measures: Vec<Measure> = names.iter().map(|name| name.parse()).collect::<Outcome<_>>().map_err(raised)?;
         let mut all = vec![0.0; chosen.len() * measures.len()];
         let tasks = chosen.iter().copied().zip(parts(&mut all, chosen.len())).collect();
-        self.each(py, tasks, |own, member| member.measure_into(&measures, own))?;
+        self.each(py, tasks, |own, member| Measure::values_into(&measures, member, own))?;
         table(py, all, measures.len())
     }
 
@@ -435,7 +443,7 @@ impl Task<'_> {
                         let each = all.len() / rows;
                         member.read(*column, &mut all[row * each..(row + 1) * each]);
                     }
-                    Record::Measure(measure, all) => all[row] = member.measure([*measure])[0],
+                    Record::Measure(measure, all) => all[row] = Measure::values([*measure], member)[0],
                     Record::Hash(all) => all[row] = member.hash(),
                 }
             }

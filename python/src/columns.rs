@@ -1,6 +1,7 @@
 //! Python arrays, divided by worlds.
 
-use drystone::batch::{Column, Measure};
+use drystone::batch::Column;
+use drystone_problems::batch::Measure;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 

@@ -1,10 +1,10 @@
 //! Families of hard cases, judged as `drystone hard --families` judges them.
 
 use drystone::metrics::half_height;
-use drystone::scenes::{Family, Member};
 use drystone::stats::largest;
 use drystone::{Backend, Cpu, World};
 use drystone_cli::hard::{Limit, Setup, families, passes};
+use drystone_scenes::{Family, Member};
 use pyo3::prelude::*;
 
 use crate::raised;

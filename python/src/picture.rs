@@ -30,7 +30,7 @@ fn device() -> Result<(wgpu::Device, wgpu::Queue)> {
 pub fn picture(world: &World, size: (u32, u32), look: Look) -> Result<Vec<u8>> {
     let (device, queue) = device()?;
     let mut canvas = Canvas::on(device, queue, world, size)?;
-    let mut film = Film::new(drystone::Scene::new("world", world.clone(), 0), ColorBy::Material);
+    let mut film = Film::new(drystone_scenes::Scene::new("world", world.clone(), 0), ColorBy::Material);
     film.add_world(0.0, world);
     let mut rgb = Vec::new();
     film.draw(&mut canvas, &look, |picture| {

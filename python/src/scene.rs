@@ -6,7 +6,7 @@ use std::sync::Arc;
 use drystone::SolverConfig;
 use drystone::batch::drives;
 use drystone::preset::Preset;
-use drystone::scenes::{CATALOGUE, SceneFile};
+use drystone_scenes::{CATALOGUE, SceneFile};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::raised;
 
 /// An immutable scene.
 #[pyclass(frozen, module = "drystone._drystone")]
-pub struct Scene(pub Arc<drystone::Scene>);
+pub struct Scene(pub Arc<drystone_scenes::Scene>);
 
 #[pymethods]
 impl Scene {
@@ -23,12 +23,12 @@ impl Scene {
         if !CATALOGUE.iter().any(|entry| entry.name == name) && name.ends_with(".json") {
             return Err(PyValueError::new_err(format!("name = {name:?}: a file is read by Scene.load")));
         }
-        drystone::Scene::find(name, &parameters).map(|scene| Self(scene.into())).map_err(raised)
+        drystone_scenes::Scene::find(name, &parameters).map(|scene| Self(scene.into())).map_err(raised)
     }
 
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
-        drystone::scenes::load(&path).map(|scene| Self(scene.into())).map_err(raised)
+        drystone_scenes::load(&path).map(|scene| Self(scene.into())).map_err(raised)
     }
 
     #[staticmethod]
@@ -106,7 +106,7 @@ type ParameterRow = (&'static str, f64, f64, f64, bool, &'static str);
 /// Name, summary and parameters of every scene.
 #[pyfunction]
 pub fn catalogue() -> Vec<(&'static str, &'static str, Vec<ParameterRow>)> {
-    let entry = |entry: &'static drystone::scenes::Entry| {
+    let entry = |entry: &'static drystone_scenes::Entry| {
         let parameters =
             entry.parameters.iter().map(|p| (p.name, p.default, p.range.0, p.range.1, p.whole, p.summary)).collect();
         (entry.name, entry.summary, parameters)
@@ -117,5 +117,5 @@ pub fn catalogue() -> Vec<(&'static str, &'static str, Vec<ParameterRow>)> {
 /// The JSON Schema of scene files.
 #[pyfunction]
 pub fn schema() -> String {
-    drystone::scenes::schema().to_string()
+    drystone_scenes::schema().to_string()
 }

@@ -13,9 +13,11 @@ use crate::world::{Axis, Body, Drive, Joint, JointHandle, Linear, MassProperties
 ///
 /// ```
 /// use drystone::batch::{Batch, Column};
-/// use drystone::{Scene, SolverConfig};
+/// use drystone_scenes::Scene;
+/// use drystone::SolverConfig;
 ///
-/// let mut batch = Batch::of(&Scene::find("tower", &["n=2".into()])?, &SolverConfig::default(), 1)?;
+/// let scene = Scene::find("tower", &["n=2".into()])?;
+/// let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 1)?;
 /// let world = batch.world_mut(0);
 /// let mut position = [0.0; 9];
 /// world.read(Column::Position, &mut position);
@@ -117,7 +119,7 @@ impl Column {
 /// ```
 /// use drystone::batch::{Column, DriveOf, drives};
 ///
-/// let scene = drystone::Scene::find("drawbridge", &[])?;
+/// let scene = drystone_scenes::Scene::find("drawbridge", &[])?;
 /// let all: Vec<DriveOf> = drives(&scene.world).collect();
 /// assert_eq!((all[0].name.as_str(), all[1].name.as_str()), ("joint 1: deck - tower", "joint 2: deck - tower"));
 /// assert_eq!((Column::Control.rows(&scene.world), Column::Control.width()), (2, 1));

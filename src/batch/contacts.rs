@@ -9,9 +9,11 @@ use crate::simulation::{Contact, Event, Hit};
 ///
 /// ```
 /// use drystone::batch::{Batch, Contacts};
-/// use drystone::{Listen, Scene, SolverConfig};
+/// use drystone::{Listen, SolverConfig};
+/// use drystone_scenes::Scene;
 ///
-/// let mut batch = Batch::of(&Scene::find("tower", &["n=2".into()])?, &SolverConfig::default(), 2)?;
+/// let scene = Scene::find("tower", &["n=2".into()])?;
+/// let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 2)?;
 /// for world in batch.worlds_mut() {
 ///     world.simulation_mut().listen(Listen { impulses: true, ..Listen::default() })?;
 /// }
@@ -79,9 +81,11 @@ fn order(contact: &Contact) -> impl Ord + use<> {
 ///
 /// ```
 /// use drystone::batch::{Batch, EventRow};
-/// use drystone::{Listen, Scene, SolverConfig};
+/// use drystone::{Listen, SolverConfig};
+/// use drystone_scenes::Scene;
 ///
-/// let mut batch = Batch::of(&Scene::find("tower", &["n=1".into()])?, &SolverConfig::default(), 2)?;
+/// let scene = Scene::find("tower", &["n=1".into()])?;
+/// let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 2)?;
 /// for world in batch.worlds_mut() {
 ///     world.simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
 /// }

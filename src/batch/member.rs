@@ -8,7 +8,6 @@ use crate::backend::cpu::Cpu;
 use crate::config::{SolverConfig, check_step_length};
 use crate::error::{Error, Result, ensure, input};
 use crate::panics;
-use crate::scenes::Scene;
 use crate::simulation::Simulation;
 use crate::stats::StepStats;
 use crate::world::World;
@@ -17,10 +16,11 @@ use crate::world::World;
 ///
 /// ```
 /// use drystone::batch::{Batch, Member, State};
-/// use drystone::{Scene, SolverConfig, glam::Vec3};
+/// use drystone_scenes::Scene;
+/// use drystone::{SolverConfig, glam::Vec3};
 ///
 /// let scene = Scene::find("tower", &["n=2".into()])?;
-/// let mut batch = Batch::of(&scene, &SolverConfig::default(), 2)?.on_threads(1)?;
+/// let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 2)?.on_threads(1)?;
 /// batch.world_mut(0).simulation_mut().world.bodies[1].force = Vec3::X * 50.0;
 /// batch.worlds_mut()[1].simulation_mut().world.bodies[1].force.x = f32::NAN;
 /// assert_eq!((batch.step(6, &[0, 1])?, batch.threads()), (vec![1], 1));
@@ -57,16 +57,12 @@ pub(super) struct Way<'a> {
 }
 
 impl Member {
-    pub(super) fn new(scene: &Scene, config: &SolverConfig) -> Result<Self> {
-        let comes_and_goes = !scene.spawners.is_empty() || !scene.leaving.is_empty();
-        ensure(!comes_and_goes, || {
-            format!("{}: bodies come or leave by themselves, and a batch has worlds of constant bodies", scene.name)
-        })?;
-        let worlds = scene.world.world_count();
-        ensure(worlds == 1, || format!("{}: {worlds} worlds beside each other: must be one", scene.name))?;
-        check_step_length(scene.dt)?;
-        let simulation = Simulation::new(scene.world.clone(), config.clone(), Box::new(Cpu::new()))?;
-        let state = State { simulation: simulation.snapshot(), dt: scene.dt, steps: 0, time: 0.0 };
+    pub(super) fn new(world: &World, dt: f32, config: SolverConfig) -> Result<Self> {
+        let worlds = world.world_count();
+        ensure(worlds == 1, || format!("{worlds} worlds beside each other: must be one"))?;
+        check_step_length(dt)?;
+        let simulation = Simulation::with(world.clone(), config, Box::new(Cpu::new()))?;
+        let state = State { simulation: simulation.snapshot(), dt, steps: 0, time: 0.0 };
         Ok(Self::of(Arc::new(state)))
     }
 

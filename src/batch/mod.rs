@@ -7,10 +7,11 @@
 //!
 //! ```
 //! use drystone::batch::Batch;
-//! use drystone::{Listen, Scene, SolverConfig};
+//! use drystone::{Listen, SolverConfig};
+//! use drystone_scenes::Scene;
 //!
 //! let scene = Scene::find("tower", &["n=3".into()])?;
-//! let mut batch = Batch::of(&scene, &SolverConfig::default(), 4)?;
+//! let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 4)?;
 //! assert!(batch.step(10, &[0, 2])?.is_empty(), "none fails");
 //! assert_eq!((batch.world(0).steps(), batch.world(1).steps()), (10, 0));
 //! // A state can be restored in other worlds, and a reset goes back to the start.
@@ -32,7 +33,6 @@
 mod column;
 mod contacts;
 mod group;
-mod measure;
 mod member;
 mod state;
 
@@ -46,13 +46,11 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::config::SolverConfig;
 use crate::error::{Result, ensure, input};
-use crate::scenes::Scene;
 use crate::world::World;
 
 pub use column::{Column, DriveOf, drives, write};
 pub use contacts::{Contacts, EventRow};
 use group::Group;
-pub use measure::Measure;
 pub use member::Member;
 use member::Way;
 pub use state::State;
@@ -83,39 +81,40 @@ pub struct Batch {
 pub struct Run<'a> {
     /// Number of steps of each world.
     pub steps: u64,
-    /// Length of a step (s), in place of that of each scene.
+    /// Length of a step (s), in place of that of each world.
     pub dt: Option<f32>,
     /// Called every 50 ms on the caller's thread. If it returns true, each world stops after its present step.
     pub stop: Option<&'a dyn Fn() -> bool>,
 }
 
 impl Batch {
-    /// A batch of worlds from scenes and settings.
+    /// A batch of worlds, each with its length of a step (s) and its settings.
     ///
     /// ```
     /// use drystone::batch::Batch;
-    /// use drystone::{Scene, SolverConfig, preset::Preset};
+    /// use drystone_scenes::Scene;
+    /// use drystone::{SolverConfig, preset::Preset};
     ///
     /// let scene = Scene::find("tower", &["n=3".into()])?;
-    /// let batch = Batch::new([(&scene, &Preset::Fast.config()), (&scene, &Preset::Accurate.config())])?;
+    /// let batch = Batch::new([Preset::Fast, Preset::Accurate].map(|preset| (&scene.world, scene.dt, preset.config())))?;
     /// assert_eq!((batch.len(), batch.world(1).simulation().config().substeps), (2, 32));
     /// # Ok::<(), drystone::Error>(())
     /// ```
     ///
     /// # Errors
-    /// There is no world; [`Simulation::new`](crate::Simulation::new) refuses a scene or settings; or a scene has
-    /// spawners or leaving bodies.
-    pub fn new<'a>(worlds: impl IntoIterator<Item = (&'a Scene, &'a SolverConfig)>) -> Result<Self> {
-        let member = |(k, (scene, config))| Member::new(scene, config).map_err(|error| of_world(k, error));
+    /// There is no world; [`Simulation::with`](crate::Simulation::with) refuses a world or settings; a [`World`] holds
+    /// several worlds beside each other; or a step is too short or too long.
+    pub fn new<'a>(worlds: impl IntoIterator<Item = (&'a World, f32, SolverConfig)>) -> Result<Self> {
+        let member = |(k, (world, dt, config))| Member::new(world, dt, config).map_err(|error| of_world(k, error));
         Self::of_members(worlds.into_iter().enumerate().map(member).collect::<Result<_>>()?)
     }
 
-    /// A batch of `count` worlds of one scene.
+    /// A batch of `count` equal worlds with steps of `dt` seconds.
     ///
     /// # Errors
     /// Those of [`Self::new`].
-    pub fn of(scene: &Scene, config: &SolverConfig, count: usize) -> Result<Self> {
-        let first = Member::new(scene, config)?;
+    pub fn of(world: &World, dt: f32, config: &SolverConfig, count: usize) -> Result<Self> {
+        let first = Member::new(world, dt, config.clone())?;
         let start = first.start().clone();
         let others = (1..count).map(|_| Member::of(start.clone()));
         Self::of_members(std::iter::once(first).take(count).chain(others).collect())
@@ -208,10 +207,11 @@ impl Batch {
     ///
     /// ```
     /// use drystone::batch::{Batch, Run};
-    /// use drystone::{Scene, SolverConfig, glam::Vec3};
+    /// use drystone_scenes::Scene;
+    /// use drystone::{SolverConfig, glam::Vec3};
     ///
     /// let scene = Scene::find("sphere-plane", &[])?;
-    /// let mut batch = Batch::of(&scene, &SolverConfig::default(), 2)?;
+    /// let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 2)?;
     /// // Each ball has its own force, and the run keeps the paths of both.
     /// let tasks = vec![(0, (0.0, Vec::new())), (1, (500.0, Vec::new()))];
     /// let mut ways = [0.0, 0.0];
@@ -256,13 +256,15 @@ impl Batch {
     /// Calls a function on some worlds between two steps, each with a value of the caller, on the threads of the batch.
     ///
     /// ```
-    /// use drystone::batch::{Batch, Measure};
-    /// use drystone::{Scene, SolverConfig};
+    /// use drystone::batch::Batch;
+    /// use drystone_scenes::Scene;
+    /// use drystone::SolverConfig;
     ///
-    /// let mut batch = Batch::of(&Scene::find("pile", &["n=8".into()])?, &SolverConfig::default(), 3)?;
+    /// let scene = Scene::find("pile", &["n=8".into()])?;
+    /// let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 3)?;
     /// let mut overlaps = [0.0; 3];
     /// let tasks = overlaps.iter_mut().enumerate().collect();
-    /// batch.each(tasks, |overlap, member| **overlap = member.measure([Measure::OverlapMax])[0])?;
+    /// batch.each(tasks, |overlap, member| **overlap = member.simulation().penetration().max)?;
     /// assert!(overlaps.iter().all(|overlap| *overlap == overlaps[0]));
     /// # Ok::<(), drystone::Error>(())
     /// ```

@@ -10,9 +10,11 @@ use crate::world::World;
 ///
 /// ```
 /// use drystone::batch::{Batch, State};
-/// use drystone::{Scene, SolverConfig};
+/// use drystone_scenes::Scene;
+/// use drystone::SolverConfig;
 ///
-/// let mut batch = Batch::of(&Scene::find("tower", &[])?, &SolverConfig::default(), 1)?;
+/// let scene = Scene::find("tower", &[])?;
+/// let mut batch = Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 1)?;
 /// batch.step(7, &[0])?;
 /// let state = batch.world(0).state();
 /// assert_eq!((state.time(), state.to_simulation().hash()), (batch.world(0).time(), state.hash()));

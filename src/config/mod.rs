@@ -1,6 +1,6 @@
 //! Every choice of the solver, in one plain struct. Feature `serde` reads and writes it.
 
-#[cfg(feature = "serde")]
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,8 @@ pub use rules::{
 /// assert!(check_step_length(1.0 / 60.0).is_ok() && check_step_length(0.0).is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub struct SolverConfig {
     /// Substeps of one step, 1 or more: the least that an island takes. Errors fall with their square, time grows with them.

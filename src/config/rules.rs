@@ -1,6 +1,6 @@
 //! The kinds of settings, and the rules that exist for comparison.
 
-#[cfg(feature = "serde")]
+#[cfg(feature = "schema")]
 use schemars::JsonSchema;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,8 @@ use crate::saved::{fields, kinds};
 /// assert!(smooth.check().is_ok());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum Friction {
     /// No tangential impulse.
@@ -62,7 +63,8 @@ pub enum FrictionRule {
 /// assert!(config.check().is_ok() && config != SolverConfig::default());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum FrictionAt {
     /// At every contact point, limited by that point's normal impulse.
@@ -87,7 +89,8 @@ kinds!(FrictionAt { Points, Manifold });
 /// assert!(config.check().is_ok());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum FrictionOrder {
     /// Normals, then friction within the cone that they span: the order of the course sheet.
@@ -109,7 +112,8 @@ kinds!(FrictionOrder { NormalsFirst, FrictionFirst });
 /// assert!(config.check().is_err());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum Clamping {
     /// Every single correction; impulses start at zero in each substep. No later correction can take back one that pushed too
@@ -131,7 +135,8 @@ kinds!(Clamping { PerCorrection, Accumulated });
 /// assert!(config.check().is_ok() && config.with(|c| c.relax = 1).check().is_err());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum Stabilization {
     /// Not at all: overlap grows.
@@ -156,7 +161,8 @@ named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", })
 /// assert!(swept.check().is_ok() && SolverConfig::default().joint_solver == JointSolver::Auto);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum JointSolver {
     /// At once where factors stay sparse, else by sweeps.
@@ -181,7 +187,8 @@ named!(JointSolver { Auto = "auto", Sweeps = "sweeps", Direct = "direct", });
 /// assert!(all.check().is_ok() && SolverConfig::default().friction_sweeps == FrictionSweeps::Relax);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum FrictionSweeps {
     /// The biased sweeps and the relax sweeps.
@@ -202,7 +209,8 @@ kinds!(FrictionSweeps { All, Relax });
 /// assert!(config.check().is_ok());
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum Method {
     /// One after another: projected Gauss-Seidel.
@@ -227,7 +235,8 @@ named!(Method { Plain = "plain", Accelerated = "accelerated", });
 /// assert!(twice.check().is_ok());
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(Serialize, Deserialize, JsonSchema), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub struct ComparisonRules {
     /// Order of normals and friction within a manifold.

@@ -56,10 +56,11 @@ const JAMMED_PASSES: u8 = 8;
 /// The passes of one step.
 ///
 /// ```
-/// use drystone::{Reference, Scene, Simulation, SolverConfig, StepPlan};
+/// use drystone::{Reference, Simulation, SolverConfig, StepPlan};
+/// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &["n=3".into()])?;
-/// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let (problem, plan) = simulation.next_problem(scene.dt)?;
 /// assert_eq!(plan, StepPlan::new(simulation.config(), &problem));
 /// assert_eq!(plan.bytes_of_passes(&problem).count(), plan.passes.len());

@@ -55,10 +55,11 @@ use crate::saved::{Archive, Saved};
 /// `totals`, `joint_impulses`, `joint_totals`, `convergence`, `momentum`).
 ///
 /// ```
-/// use drystone::{Reference, Scene, Simulation, SolverConfig, StepProblem};
+/// use drystone::{Reference, Simulation, SolverConfig, StepProblem};
+/// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &["n=3".into()])?;
-/// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.step(scene.dt)?;
 /// let problem: StepProblem = simulation.problem().clone();
 /// problem.check()?;

@@ -283,7 +283,7 @@ pub struct AxisRow {
 
 impl AxisRow {
     /// Whether it is a limit: of two bounds that differ.
-    pub(crate) fn is_limit(&self) -> bool {
+    pub fn is_limit(&self) -> bool {
         self.left > 0.5 * NO_LIMIT
     }
 

@@ -99,7 +99,7 @@ macro_rules! kinds {
 pub(crate) use kinds;
 
 /// A hash of bytes. It works on words of eight bytes, so that it takes less time than writing them.
-pub(crate) fn hash_of(bytes: &[u8]) -> u64 {
+pub fn hash_of(bytes: &[u8]) -> u64 {
     let (words, rest) = bytes.as_chunks::<8>();
     let mut last = [0; 8];
     last[..rest.len()].copy_from_slice(rest);

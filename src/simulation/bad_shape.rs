@@ -80,7 +80,7 @@ fn begun() -> Simulation {
     let mut falls = Body::dynamic().shape(ball).position(3.0, 1.0, 0.0).named("culprit");
     falls.colliders[0].shape.0 = SharedShape::new(Bad(Ball::new(0.5)));
     world.insert(falls);
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a world");
+    let mut simulation = Simulation::new(world).expect("a world");
     simulation.listen(Listen { contacts: true, ..Listen::default() }).expect("no speed");
     simulation
 }
@@ -123,8 +123,7 @@ fn a_run_goes_on_without_what_could_not_be_computed() {
     failed(&mut simulation);
     let culprit = simulation.world.bodies.handle(5).expect("the culprit");
     simulation.world.remove(culprit);
-    let mut other =
-        Simulation::new(simulation.world.clone(), SolverConfig::default(), Box::new(Cpu::new())).expect("it");
+    let mut other = Simulation::new(simulation.world.clone()).expect("it");
     let mut began = 0;
     for step in 0..60 {
         simulation.step(DT).expect("nothing is bad any more");

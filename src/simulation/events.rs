@@ -15,7 +15,7 @@ use crate::world::{BodyHandle, JointHandle};
 /// ```
 /// use drystone::{Listen, Reference, Simulation, SolverConfig, World};
 ///
-/// let mut simulation = Simulation::new(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { hits_above: Some(0.5), ..Listen::default() })?;
 /// assert!(simulation.listen(Listen { hits_above: Some(-1.0), ..Listen::default() }).is_err());
 /// assert_eq!(simulation.listening().hits_above, Some(0.5));
@@ -54,7 +54,7 @@ impl Listen {
 /// let mut world = World::new();
 /// let room = world.insert(Body::fixed().sensor(Shape::cuboid(1.0, 1.0, 1.0)));
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)));
-/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.step(1.0 / 60.0)?;
 /// let [sensor, visitor] = [room, ball].map(|body| ColliderOf { body, collider: 0 });
 /// assert_eq!(simulation.overlaps(), [[sensor, visitor]]);
@@ -77,7 +77,7 @@ crate::saved::fields!(ColliderOf { body, collider });
 /// # let mut world = World::new();
 /// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
-/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { contacts: true, ..Listen::default() })?;
 /// let mut landed = false;
 /// for _ in 0..60 {
@@ -152,7 +152,7 @@ pub enum Event {
 /// # let mut world = World::new();
 /// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
-/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { hits_above: Some(1.0), ..Listen::default() })?;
 /// let mut hits: Vec<Hit> = Vec::new();
 /// for _ in 0..60 {

@@ -21,7 +21,7 @@ impl Simulation {
 
 /// The hash of all bodies, and one byte for each body in the order of indices: the lowest byte of the same hash of that
 /// body alone.
-pub(crate) fn hashes(bodies: &Bodies) -> (u64, Vec<u8>) {
+pub fn hashes(bodies: &Bodies) -> (u64, Vec<u8>) {
     let mut of_all = BASIS;
     let of_each = numbers_of(bodies).map(|numbers| {
         of_all = add(of_all, numbers);

@@ -46,7 +46,7 @@ use crate::world::{Body, Material, World};
 /// let [rough, icy] = [-10.0, 10.0].map(|x| world.add(slider().position(x, 0.5, 0.0)));
 /// let ghost = world.add(slider().named("ghost").position(20.0, 0.5, 0.0));
 /// world.add(slider().named("ghost").position(20.5, 0.5, 0.0));
-/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.set_hooks(Some(Box::new(Rules)));
 /// (0..30).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let speed = |body: usize| simulation.world.bodies[body].linear_velocity.x;
@@ -94,7 +94,7 @@ pub trait ContactHooks: Send {
 /// let platform = world.add(Body::fixed().shape(Shape::cuboid(2.0, 0.1, 2.0)));
 /// let ball = |y: f32| Body::dynamic().shape(Shape::ball(0.2)).position(0.0, y, y);
 /// let [rises, falls] = [(-1.0, 2.0), (1.0, -2.0)].map(|(y, v)| world.add(ball(y).velocity(Vec3::Y * v, Vec3::ZERO)));
-/// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.set_hooks(Some(Box::new(OneWay(platform))));
 /// (0..60).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// assert!((simulation.world.bodies[rises].position.y - 1.0).abs() < 1e-3);

@@ -12,7 +12,7 @@ use crate::problem::{ContactRows, ImpulseRow, StepProblem};
 /// # let mut world = World::new();
 /// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
-/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let manifold: SolvedManifold = simulation.manifolds().next().expect("a ball on the floor");
@@ -54,7 +54,7 @@ pub struct SolvedManifold {
 /// # let mut world = World::new();
 /// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
-/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let manifold = simulation.manifolds().next().expect("a ball on the floor");
@@ -89,7 +89,7 @@ pub struct SolvedPoint {
 /// # let mut world = World::new();
 /// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
-/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let manifold = simulation.manifolds().next().expect("a ball on the floor");

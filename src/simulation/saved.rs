@@ -14,7 +14,7 @@ use crate::world::World;
 /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
 /// # let mut world = World::new();
 /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
-/// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let mut state: drystone::Snapshot = simulation.snapshot();
 /// simulation.step(1.0 / 60.0)?;
 /// simulation.snapshot_into(&mut state);
@@ -61,7 +61,7 @@ impl Simulation {
     /// let mut world = World::new();
     /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
     /// world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
-    /// let mut one = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut one = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// one.step(1.0 / 60.0)?;
     /// let mut other = one.fork(Box::new(Cpu::new()));
     /// one.step(1.0 / 60.0)?;
@@ -85,7 +85,7 @@ impl Simulation {
     /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
     /// # let mut world = World::new();
     /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
-    /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let before = simulation.snapshot();
     /// simulation.step(1.0 / 60.0)?;
     /// let after = simulation.hash();
@@ -147,7 +147,7 @@ impl Simulation {
     /// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
     /// # let mut world = World::new();
     /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
-    /// # let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let bytes = simulation.save();
     /// let mut again = Simulation::load(&bytes, Box::new(Cpu::new()))?;
     /// simulation.step(1.0 / 60.0)?;

@@ -20,11 +20,8 @@ use crate::saved::{Archive, Saved};
 /// gate.kind = BodyKind::Fixed;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Deserialize, serde::Serialize, schemars::JsonSchema),
-    serde(rename_all = "lowercase")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "lowercase"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum BodyKind {
     /// Never moves.
@@ -417,7 +414,14 @@ impl Body {
     }
 
     /// A body of this kind, without shapes.
-    pub(crate) fn new(kind: BodyKind) -> Self {
+    ///
+    /// ```
+    /// use drystone::{Body, BodyKind, Shape};
+    ///
+    /// let body = Body::new(BodyKind::Dynamic).shape(Shape::ball(0.5));
+    /// assert_eq!(body, Body::dynamic().shape(Shape::ball(0.5)));
+    /// ```
+    pub fn new(kind: BodyKind) -> Self {
         Self {
             name: String::new(),
             kind,
@@ -503,7 +507,7 @@ impl Body {
     /// let mut world = World::new();
     /// let gate = world.insert(Body::fixed().sensor(Shape::cuboid(1.0, 0.1, 1.0)));
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(0.0, 1.0, 0.0));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let mut told = Vec::new();
     /// for _ in 0..60 {
     ///     simulation.step(1.0 / 60.0)?;
@@ -610,7 +614,7 @@ impl Body {
     /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     /// let ball = Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X, Vec3::Y).linear_damping(2.0).angular_damping(1.0);
     /// let ball = world.insert(ball);
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.step(0.5)?;
     /// let ball = simulation.world.body(ball).expect("still there");
     /// assert!((ball.linear_velocity.x - (-1.0_f32).exp()).abs() < 1e-6);
@@ -920,7 +924,7 @@ impl Body {
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
     /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(2.0));
-    /// let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.world.body_mut(ball).expect("just put in").apply_force(Vec3::X * 8.0);
     /// simulation.step(0.25)?;
     /// simulation.step(0.25)?;
@@ -994,8 +998,19 @@ impl Body {
             * self.angular_velocity.as_dvec3()
     }
 
-    /// Refuses a body that cannot be simulated.
-    pub(crate) fn check(&self) -> Result<()> {
+    /// Refuses a body that cannot be simulated, as [`World::check`](crate::World::check) does.
+    ///
+    /// ```
+    /// use drystone::{Body, Shape};
+    ///
+    /// assert!(Body::dynamic().shape(Shape::ball(0.5)).check().is_ok());
+    /// let error = Body::dynamic().shape(Shape::ball(0.5)).friction(-1.0).check().expect_err("a slip");
+    /// assert_eq!(error.to_string(), "friction = -1: must be 0 or more");
+    /// ```
+    ///
+    /// # Errors
+    /// One line names the number, or the shape, and its range.
+    pub fn check(&self) -> Result<()> {
         self.check_motion()?;
         self.check_shapes()?;
         self.check_surface()

@@ -135,7 +135,18 @@ fn angles(q: Quat) -> [f32; 3] {
 
 impl Joint {
     /// Refuses frames that are not rotations, and limits and drives that are out of range.
-    pub(crate) fn check_axes(&self) -> Result<()> {
+    ///
+    /// ```
+    /// use drystone::{Body, Joint, World, glam::Vec3};
+    ///
+    /// let body = World::new().add(Body::dynamic());
+    /// let hinge = |axis| Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).hinge(axis).check_axes();
+    /// assert!(hinge(Vec3::Y).is_ok() && hinge(Vec3::ZERO).is_err());
+    /// ```
+    ///
+    /// # Errors
+    /// One line names the axis, the number and its range.
+    pub fn check_axes(&self) -> Result<()> {
         let message =
             || "its axis has no direction: hinge, slider and along take a vector with a finite length above 0".into();
         ensure(self.frame_b != NO_FRAME, message)?;

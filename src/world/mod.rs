@@ -11,7 +11,7 @@ mod joints;
 mod lever;
 mod limits;
 mod mass;
-mod shape;
+pub(crate) mod shape;
 mod shape_parts;
 mod surface;
 mod tag;
@@ -317,8 +317,22 @@ impl World {
         self.bodies.get(i).map_or_else(|| format!("body {i}"), |body| name_of(i, body))
     }
 
-    /// Refuses joints to bodies that do not exist, and anchors that are out of range.
-    pub(crate) fn check_joints(&self) -> Result<()> {
+    /// Refuses joints to bodies that do not exist, and anchors, axes and limits that are out of range.
+    ///
+    /// ```
+    /// use drystone::{Body, Joint, World, glam::Vec3};
+    ///
+    /// let mut world = World::new();
+    /// let body = world.add(Body::dynamic());
+    /// world.join(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO));
+    /// assert!(world.check_joints().is_ok());
+    /// world.joints[0].anchor_a.x = f32::NAN;
+    /// assert!(world.check_joints().is_err());
+    /// ```
+    ///
+    /// # Errors
+    /// One line names the joint.
+    pub fn check_joints(&self) -> Result<()> {
         for (i, joint) in self.joints.iter().enumerate() {
             let bodies = [Some(joint.body_a), joint.body_b];
             let exist = bodies.into_iter().flatten().try_for_each(|body| self.bodies.check_handle(body));

@@ -132,9 +132,15 @@ impl Shape {
 
     /// Refuses a shape without extent, or with a number that is not finite or larger than [`MOST_LENGTH`].
     ///
+    /// ```
+    /// use drystone::Shape;
+    ///
+    /// assert!(Shape::ball(0.5).check().is_ok() && Shape::ball(0.0).check().is_err());
+    /// ```
+    ///
     /// # Errors
     /// One line names the shape, the number and its range.
-    pub(crate) fn check(&self) -> Result<()> {
+    pub fn check(&self) -> Result<()> {
         let sizes = |kind: &str, sizes: &[(&str, f32)]| {
             sizes.iter().try_for_each(|(name, size)| {
                 let message = || format!("{kind} of {name} {size}: must be more than 0 and at most {MOST_LENGTH:e} m");
@@ -218,12 +224,12 @@ impl Shape {
 }
 
 /// A pose from its two parts.
-pub(crate) fn pose(position: Vec3, rotation: Quat) -> Pose {
+pub fn pose(position: Vec3, rotation: Quat) -> Pose {
     Pose::from_parts(position, rotation)
 }
 
 /// Converts the pose `local` out of the frame with the pose `frame`.
-pub(crate) fn placed(frame: Pose, local: Pose) -> Pose {
+pub fn placed(frame: Pose, local: Pose) -> Pose {
     pose(frame.translation + frame.rotation * local.translation, rotation::product(frame.rotation, local.rotation))
 }
 

@@ -1,11 +1,12 @@
 //! Contact problems whose solution is known, and how long a solver takes to find it.
 #![allow(dead_code)]
 
+use drystone::Backend;
 use drystone::config::Method;
-use drystone::contacts::{FreeBody, PointContact, Velocity};
-use drystone::residuals::Measure;
-use drystone::solver::{Order, Solver};
-use drystone::{Backend, ContactProblem};
+use drystone_problems::ContactProblem;
+use drystone_problems::contacts::{FreeBody, PointContact, Velocity};
+use drystone_problems::residuals::Measure;
+use drystone_problems::solver::{Order, Solver};
 use glam::{DMat3, DVec3};
 
 /// Step length of the problems [s].

@@ -1,7 +1,8 @@
 //! A world whose islands take different numbers of substeps.
 
 use drystone::glam::Vec3;
-use drystone::{Body, Joint, Scene, Shape};
+use drystone::{Body, Joint, Shape};
+use drystone_scenes::Scene;
 
 /// A pile of boxes that fall, a tower under a top 1000 times as heavy, one under a top 100 times as heavy, a rod on a joint, and two
 /// chains with a heavy end, one of which lies on boxes.

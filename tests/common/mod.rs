@@ -12,7 +12,7 @@ pub mod tolerance;
 use drystone::Backend;
 // The checks of `drystone conform` share them.
 #[allow(unused_imports)]
-pub use drystone::stages::conform::{difference, passes as kernels, random};
+pub use drystone_conform::{difference, passes as kernels, random};
 
 /// Opens the backend that a test runs on.
 pub type Open = fn() -> Box<dyn Backend>;

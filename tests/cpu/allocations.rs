@@ -1,7 +1,9 @@
 //! A settled step allocates nothing.
 
 use crate::common::counting;
-use drystone::{Body, Cpu, Listen, Scene, Shape, Simulation, SolverConfig, World, glam::Vec3};
+use drystone::glam::Vec3;
+use drystone::{Body, Cpu, Listen, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 /// Allocations of the steps that compute no contact, and of the others, in 40 steps of a pile of 500 boxes on `threads` threads.
 /// `listens`: to all that there is, and with a sensor around the pile.
@@ -13,7 +15,7 @@ fn allocations(threads: usize, config: SolverConfig, listens: bool) -> [usize; 2
         if listens {
             scene.world.add(Body::fixed().sensor(Shape::ball(3.0)));
         }
-        let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("good settings");
+        let mut simulation = Simulation::with(scene.world, config, Box::new(Cpu::new())).expect("good settings");
         if listens {
             let all = Listen { contacts: true, hits_above: Some(0.0), impulses: true };
             simulation.listen(all).expect("a good threshold");
@@ -66,8 +68,7 @@ fn a_small_simulation_allocates_in_its_first_step_alone() {
             for i in 0..10 {
                 world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
             }
-            let mut simulation =
-                Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+            let mut simulation = Simulation::new(world).expect("a good world");
             for of_step in &mut asked {
                 let before = counting::asked();
                 simulation.step(1.0 / 60.0).expect("a step");

@@ -2,10 +2,12 @@
 
 use std::cell::Cell;
 
-use drystone::batch::{Batch, Column, Measure, Run, State, drives, write};
+use drystone::batch::{Batch, Column, Run, State, drives, write};
 use drystone::glam::Vec3;
-use drystone::scenes::CATALOGUE;
-use drystone::{BodyKind, Cpu, Joint, Listen, Scene, Simulation, SolverConfig, World};
+use drystone::{BodyKind, Cpu, Joint, Listen, Result, Simulation, SolverConfig, World};
+use drystone_problems::batch::Measure;
+use drystone_problems::step_with_residuals;
+use drystone_scenes::{CATALOGUE, Scene};
 
 const SCENES: [(&str, &[&str]); 5] = [
     ("tower", &["n=5"]),
@@ -20,6 +22,11 @@ fn scene(name: &str, parameters: &[&str]) -> Scene {
     Scene::find(name, &parameters).expect("the scene")
 }
 
+/// A batch of equal worlds.
+fn batch_of(scene: &Scene, config: &SolverConfig, count: usize) -> Result<Batch> {
+    Batch::of(&scene.world, scene.dt, config, count)
+}
+
 /// What is done to a world before a step, by the number of the world.
 fn push(world: usize, step: u64, bodies: &mut World) {
     if step % 20 == 7 {
@@ -30,7 +37,7 @@ fn push(world: usize, step: u64, bodies: &mut World) {
 
 /// The hash of a world alone after each step.
 fn alone(scene: &Scene, config: &SolverConfig, world: usize, steps: u64) -> Vec<u64> {
-    let mut simulation = Simulation::new(scene.world.clone(), config.clone(), Box::new(Cpu::new())).expect("a world");
+    let mut simulation = Simulation::with(scene.world.clone(), config.clone(), Box::new(Cpu::new())).expect("a world");
     let mut step = |step| {
         push(world, step, &mut simulation.world);
         simulation.step(scene.dt).expect("a step");
@@ -65,7 +72,11 @@ fn a_world_has_the_bits_of_the_world_alone() {
     // Every scene with both settings, and a world of each pair whatever stands beside it.
     for (worlds, threads) in [(1, 1), (1, 2), (7, 1), (7, 2), (7, 3), (12, 2)] {
         let kind = |k: usize| (&scenes[k % scenes.len()], &configs[k % configs.len()]);
-        let mut batch = Batch::new((0..worlds).map(kind)).expect("worlds").on_threads(threads).expect("threads");
+        let mut batch =
+            Batch::new((0..worlds).map(kind).map(|(scene, config)| (&scene.world, scene.dt, config.clone())))
+                .expect("worlds")
+                .on_threads(threads)
+                .expect("threads");
         let chosen: Vec<usize> = (0..worlds).collect();
         let of_all = hashes(&mut batch, &chosen, 60);
         for (k, of_one) in of_all.iter().enumerate() {
@@ -101,7 +112,8 @@ fn worlds_that_run_as_one_have_the_bits_of_each_alone() {
         tried += 1;
         let configs = [SolverConfig::default(), SolverConfig::default().without_sleep()];
         let config = |world: usize| &configs[usize::from(world % 4 == 3)];
-        let mut batch = Batch::new((0..16).map(|world| (&scene, config(world)))).expect("worlds");
+        let mut batch =
+            Batch::new((0..16).map(|world| (&scene.world, scene.dt, config(world).clone()))).expect("worlds");
         batch = batch.on_threads(1).expect("a thread");
         let listens = |world: usize| world % 8 == 6;
         for world in (0..16).filter(|&world| listens(world)) {
@@ -124,7 +136,7 @@ fn worlds_that_run_as_one_have_the_bits_of_each_alone() {
         let seen = seen.into_inner().expect("no panic");
         for (world, hashes) in seen.iter().enumerate() {
             let mut one =
-                Simulation::new(scene.world.clone(), config(world).clone(), Box::new(Cpu::new())).expect("one");
+                Simulation::with(scene.world.clone(), config(world).clone(), Box::new(Cpu::new())).expect("one");
             if listens(world) {
                 one.listen(listen).expect("a listener");
             }
@@ -145,7 +157,7 @@ fn a_reset_gives_the_bits_of_a_fresh_world_and_leaves_the_others() {
         let scene = scene(name, parameters);
         for config in [SolverConfig::default(), SolverConfig::default().without_sleep()] {
             for at in [32, 37, 200] {
-                let mut batch = Batch::of(&scene, &config, 3).expect("worlds").on_threads(2).expect("threads");
+                let mut batch = batch_of(&scene, &config, 3).expect("worlds").on_threads(2).expect("threads");
                 hashes(&mut batch, &[0, 1, 2], at);
                 let others = [batch.world(0).hash(), batch.world(2).hash()];
                 batch.reset(&[1]).expect("a world");
@@ -163,7 +175,7 @@ fn a_reset_gives_the_bits_of_a_fresh_world_and_leaves_the_others() {
 fn a_state_goes_on_to_the_same_bits_in_another_world_and_as_bytes() {
     for (name, parameters) in SCENES {
         let scene = scene(name, parameters);
-        let mut batch = Batch::of(&scene, &SolverConfig::default(), 3).expect("worlds");
+        let mut batch = batch_of(&scene, &SolverConfig::default(), 3).expect("worlds");
         hashes(&mut batch, &[0, 1, 2], 37);
         let state = batch.world(0).state();
         assert_eq!((state.hash(), state.steps()), (batch.world(0).hash(), 37));
@@ -197,7 +209,7 @@ fn a_world_that_fails_stops_alone_as_it_was_before_the_step() {
         ("gravity", |world| world.gravity.y = f32::INFINITY),
     ];
     for (what, fault) in faults {
-        let mut batch = Batch::of(&scene, &config, 4).expect("worlds").on_threads(2).expect("threads");
+        let mut batch = batch_of(&scene, &config, 4).expect("worlds").on_threads(2).expect("threads");
         batch.step(20, &[0, 1, 2, 3]).expect("worlds");
         let run = Run { steps: 30, ..Run::default() };
         let tasks = (0..4).map(|world| (world, world)).collect();
@@ -221,7 +233,7 @@ fn a_world_that_fails_stops_alone_as_it_was_before_the_step() {
 
 #[test]
 fn worlds_that_are_not_there_or_not_in_order_move_nothing() {
-    let mut batch = Batch::of(&scene("tower", &[]), &SolverConfig::default(), 3).expect("worlds");
+    let mut batch = batch_of(&scene("tower", &[]), &SolverConfig::default(), 3).expect("worlds");
     for (worlds, line) in [
         (&[0, 3][..], "world 3: there are 3"),
         (&[1, 0], "world 0: worlds must be ascending"),
@@ -230,8 +242,9 @@ fn worlds_that_are_not_there_or_not_in_order_move_nothing() {
         assert_eq!(batch.step(1, worlds).expect_err("refused").to_string(), line);
     }
     assert!(batch.worlds().iter().all(|member| member.steps() == 0));
-    assert!(Batch::of(&scene("tower", &[]), &SolverConfig::default(), 0).is_err());
-    assert!(Batch::of(&scene("galton", &[]), &SolverConfig::default(), 1).is_err(), "its balls come by themselves");
+    assert!(batch_of(&scene("tower", &[]), &SolverConfig::default(), 0).is_err());
+    let two = Scene::find_worlds("tower", &[], 2, None).expect("worlds");
+    assert!(batch_of(&two, &SolverConfig::default(), 1).is_err(), "two worlds beside each other");
     let bytes = batch.world(0).state().save();
     for cut in [0, 7, 30, 36, 50, bytes.len() - 1] {
         assert!(State::load(&bytes[..cut]).is_err(), "{cut} bytes");
@@ -245,7 +258,7 @@ fn worlds_that_are_not_there_or_not_in_order_move_nothing() {
 
 #[test]
 fn a_run_that_is_stopped_leaves_every_world_between_two_steps() {
-    let mut batch = Batch::of(&scene("pile", &["n=27"]), &SolverConfig::default().without_sleep(), 3).expect("worlds");
+    let mut batch = batch_of(&scene("pile", &["n=27"]), &SolverConfig::default().without_sleep(), 3).expect("worlds");
     let asked = Cell::new(0);
     let stop = || {
         asked.set(asked.get() + 1);
@@ -267,7 +280,7 @@ fn drives_are_set_without_a_loss_of_impulses() {
     let scene = scene("drawbridge", &[]);
     let names: Vec<_> = drives(&scene.world).map(|drive| drive.name).collect();
     assert_eq!(names, ["joint 1: deck - tower", "joint 2: deck - tower"]);
-    let mut batch = Batch::of(&scene, &SolverConfig::default(), 2).expect("worlds");
+    let mut batch = batch_of(&scene, &SolverConfig::default(), 2).expect("worlds");
     batch.step(40, &[0, 1]).expect("worlds");
     let mut ctrl = [0.0; 3];
     batch.world(0).read(Column::Control, &mut ctrl);
@@ -289,13 +302,13 @@ fn contacts_and_measures_do_not_depend_on_neighbors_and_threads() {
     let scene = scene("pile", &["n=27"]);
     let listen = Listen { contacts: true, impulses: true, hits_above: Some(0.5) };
     let of = |worlds: usize, threads: usize| {
-        let mut batch = Batch::of(&scene, &SolverConfig::default(), worlds).expect("worlds");
+        let mut batch = batch_of(&scene, &SolverConfig::default(), worlds).expect("worlds");
         batch = batch.on_threads(threads).expect("threads");
         batch.worlds_mut().iter_mut().for_each(|world| world.simulation_mut().listen(listen).expect("a listener"));
         let all: Vec<usize> = (0..worlds).collect();
         hashes(&mut batch, &all, 50);
         let last = worlds - 1;
-        let measures = batch.world(last).measure(Measure::ALL).map(f64::to_bits);
+        let measures = Measure::values(Measure::ALL, batch.world(last)).map(f64::to_bits);
         let events = batch.events(&[last]).expect("a world").into_iter();
         let events: Vec<_> = events.map(|event| (event.kind, event.a, event.b, event.value.to_bits())).collect();
         (batch.contacts(&[last]).expect("a world"), events, measures)
@@ -316,13 +329,13 @@ fn residuals_are_those_of_the_next_step_and_the_world_stays_as_it_is() {
     let scene = scene("pile", &["n=27"]);
     let of = |substeps: u32| {
         let config = SolverConfig::default().with(|c| (c.substeps, c.max_substeps) = (substeps, substeps));
-        let mut batch = Batch::of(&scene, &config, 2).expect("worlds");
+        let mut batch = batch_of(&scene, &config, 2).expect("worlds");
         assert!(batch.step(40, &[0, 1]).expect("worlds").is_empty());
         let before = batch.world(0).hash();
-        let values = batch.world(0).measure(measures);
+        let values = Measure::values(measures, batch.world(0));
         assert_eq!(batch.world(0).hash(), before);
         let mut simulation = batch.world(0).simulation().fork(Box::new(Cpu::new()));
-        let residuals = simulation.step_with_residuals(scene.dt).expect("a step");
+        let residuals = step_with_residuals(&mut simulation, scene.dt).expect("a step");
         assert_eq!(values, [residuals.e_vel, residuals.cone, residuals.diss]);
         batch.step(5, &[0, 1]).expect("worlds");
         assert_eq!(batch.world(0).hash(), batch.world(1).hash(), "a measure changes nothing");
@@ -330,21 +343,21 @@ fn residuals_are_those_of_the_next_step_and_the_world_stays_as_it_is() {
     };
     let [velocity, cone, dissipation] = of(8);
     assert!(velocity > 0.0 && velocity < 0.5 && cone.is_finite() && dissipation.is_finite(), "{velocity}");
-    let jointed = Batch::of(&self::scene("drawbridge", &[]), &SolverConfig::default(), 1).expect("a world");
-    assert!(jointed.world(0).measure(measures).iter().all(|value| value.is_nan()));
+    let jointed = batch_of(&self::scene("drawbridge", &[]), &SolverConfig::default(), 1).expect("a world");
+    assert!(Measure::values(measures, jointed.world(0)).iter().all(|value| value.is_nan()));
 }
 
 #[test]
 fn asleep_a_world_has_no_residuals() {
-    let mut batch = Batch::of(&scene("tower", &["n=2"]), &SolverConfig::default(), 1).expect("a world");
+    let mut batch = batch_of(&scene("tower", &["n=2"]), &SolverConfig::default(), 1).expect("a world");
     batch.step(300, &[0]).expect("a world");
-    let [asleep, velocity] = batch.world(0).measure([Measure::Asleep, Measure::ResidualVelocity]);
+    let [asleep, velocity] = Measure::values([Measure::Asleep, Measure::ResidualVelocity], batch.world(0));
     assert_eq!((asleep, velocity), (2.0, 0.0));
 }
 
 #[test]
 fn a_mass_is_scaled_from_that_of_the_start_and_no_other_changes() {
-    let mut batch = Batch::of(&scene("tower", &["n=3"]), &SolverConfig::default(), 2).expect("worlds");
+    let mut batch = batch_of(&scene("tower", &["n=3"]), &SolverConfig::default(), 2).expect("worlds");
     let first = batch.world(0).simulation().world.bodies[2].mass;
     for scale in [0.3, 7.0, 2.0] {
         let mut scales = [0.0; 4];
@@ -372,7 +385,7 @@ fn a_mass_is_scaled_from_that_of_the_start_and_no_other_changes() {
 fn a_joint_that_breaks_leaves_its_columns_empty() {
     let mut scene = scene("sphere-plane", &[]);
     scene.world.join(Joint::to_world(1, Vec3::ZERO, Vec3::new(0.0, 2.5, 0.0)).breaking_at(1.0));
-    let mut batch = Batch::of(&scene, &SolverConfig::default(), 1).expect("a world");
+    let mut batch = batch_of(&scene, &SolverConfig::default(), 1).expect("a world");
     assert!(batch.step(1, &[0]).expect("a world").is_empty());
     let event = batch.events(&[0]).expect("a world")[0];
     assert!(event.kind == "broke" && event.value > 1.0, "{event:?}");

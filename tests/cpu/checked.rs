@@ -4,14 +4,15 @@ use crate::common::settings::set;
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::plan::{Kernel, Pass};
 use drystone::stages::problem::{AxisRow, DampingRow, InertiaRow, JointImpulseRow, TorqueRow};
-use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone_scenes::Scene;
 
 /// The problem of a step with contacts, joints and spins, and its plan.
 fn step(settings: &[&str]) -> (StepProblem, StepPlan) {
     let mut config = SolverConfig::default();
     settings.iter().for_each(|s| set(&mut config, s));
     let scene = Scene::find("bridge", &[]).expect("the scene");
-    let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
+    let mut simulation = Simulation::with(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
     for _ in 0..60 {
         simulation.step(scene.dt).expect("a step");
     }
@@ -48,7 +49,7 @@ fn every_step_that_a_simulation_builds_keeps_what_backends_rely_on() {
             let scene = Scene::find_spec(name).expect("the scene");
             let mut config = SolverConfig::default().with(|c| c.sleep_after = 0.2);
             rule.iter().for_each(|s| set(&mut config, s));
-            let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
+            let mut simulation = Simulation::with(scene.world, config, Box::new(Cpu::new())).expect("a simulation");
             for step in 0..60 {
                 simulation.step(scene.dt).expect("a step");
                 let plan = simulation.plan().clone();

@@ -2,9 +2,10 @@
 
 use crate::common::state::reference;
 use drystone::stages::backend::CheckedStep;
-use drystone::stages::compare::{BodyDifference, Difference, FirstDifference, Stage, compare, first_difference};
 use drystone::stages::problem::{JointImpulseRow, JointRow};
-use drystone::{Backend, Reference, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::{Backend, Reference, Result, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone_conform::compare::{BodyDifference, Difference, FirstDifference, Stage, compare, first_difference};
+use drystone_scenes::Scene;
 
 /// What goes wrong at one pass.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +59,7 @@ fn pile() -> Scene {
 fn lying() -> (StepProblem, StepPlan) {
     let scene = pile();
     let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
+        Simulation::with(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
     for _ in 0..40 {
         simulation.step(scene.dt).expect("the reference runs");
     }

@@ -1,7 +1,7 @@
 //! Contact problems as text: what is written is read back, and what is wrong is named.
 
 use crate::common::contacts::tower;
-use drystone::ContactProblem;
+use drystone_problems::ContactProblem;
 use glam::DVec3;
 
 /// A problem that has no zero and no round number where one could be mistaken for another.

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 
 use drystone::config::FrictionAt;
 use drystone::stages::problem::effective::{EffectiveMass, InverseMass};
-use drystone::{Backend, Cpu, Scene, Simulation, SolverConfig, StepStats, World};
+use drystone::{Backend, Cpu, Simulation, SolverConfig, StepStats, World};
+use drystone_scenes::Scene;
 
 /// FNV-1a over every bit of every pose and velocity.
 fn hash(world: &World) -> u64 {
@@ -26,7 +27,7 @@ fn pile(backend: fn() -> Box<dyn Backend>, seed: u32, steps: u32, threads: usize
     pool.install(|| {
         let scene = Scene::find("pile", &["n=300".into(), format!("seed={seed}")]).expect("the scene");
         let mut simulation =
-            Simulation::new(scene.world, SolverConfig::default().without_sleep(), backend()).expect("good settings");
+            Simulation::with(scene.world, SolverConfig::default().without_sleep(), backend()).expect("good settings");
         let mut stats = StepStats::default();
         for _ in 0..steps {
             stats = simulation.step(scene.dt).expect("a step");
@@ -64,8 +65,8 @@ fn the_number_of_threads_changes_no_bit_of_any_shape() {
                 let parameters: Vec<String> =
                     Some(parameter).filter(|p| !p.is_empty()).map(Into::into).into_iter().collect();
                 let scene = Scene::find(name, &parameters).expect("the scene");
-                let mut simulation =
-                    Simulation::new(scene.world, SolverConfig::default().without_sleep(), cpu()).expect("a simulation");
+                let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), cpu())
+                    .expect("a simulation");
                 let touched: usize = (0..steps).map(|_| simulation.step(scene.dt).expect("a step").computed).sum();
                 assert!(touched > 0, "{name}: nothing touches");
                 hash(&simulation.world)
@@ -103,7 +104,7 @@ fn reused_contacts_hold_as_well_as_new_ones() {
     let heights = |recycle_distance: f32| {
         let scene = Scene::find("tower", &["n=8".into()]).expect("the scene");
         let config = SolverConfig::default().without_sleep().with(|c| c.recycle_distance = recycle_distance);
-        let mut simulation = Simulation::new(scene.world, config, cpu()).expect("good settings");
+        let mut simulation = Simulation::with(scene.world, config, cpu()).expect("good settings");
         let mut computed = 0;
         for _ in 0..300 {
             computed += simulation.step(scene.dt).expect("a step").computed;
@@ -122,7 +123,7 @@ fn reused_contacts_hold_as_well_as_new_ones() {
 fn a_reused_manifold_keeps_the_masses_that_its_arms_have() {
     let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
     let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default().without_sleep(), cpu()).expect("a simulation");
+        Simulation::with(scene.world, SolverConfig::default().without_sleep(), cpu()).expect("a simulation");
     let mut reused = 0;
     for _ in 0..80 {
         let stats = simulation.step(1.0 / 60.0).expect("a step");
@@ -166,7 +167,7 @@ fn what_a_reused_contact_carries_stays_with_it() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
         let scene = Scene::find("pile", &["n=100".into()]).expect("the scene");
         let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at);
-        let mut simulation = Simulation::new(scene.world, config, cpu()).expect("a simulation");
+        let mut simulation = Simulation::with(scene.world, config, cpu()).expect("a simulation");
         let (mut carried, mut ended) = (0, 0);
         for step in 0..100 {
             simulation.step(scene.dt).expect("a step");

@@ -420,7 +420,7 @@ fn run(shape: &str, kind: &str, seed: u64) -> Outcome {
         drops.push(drop);
     }
     let config = SolverConfig::default().without_sleep();
-    let mut simulation = Simulation::new(world, config.clone(), Box::new(Cpu::new())).expect("a simulation");
+    let mut simulation = Simulation::with(world, config.clone(), Box::new(Cpu::new())).expect("a simulation");
     for step in 1..=STEPS {
         simulation.step(dt as f32).expect("a step");
         let floor = &simulation.world.bodies[0];
@@ -510,7 +510,7 @@ fn slid(floor: Shape, shape: Shape, height: f32, friction: f32) -> (f32, f32) {
     let body = Body::dynamic().shape(shape).friction(friction).position(-3.0, height, 0.05);
     world.add(body.velocity(Vec3::new(4.0, 0.0, 0.3), Vec3::ZERO));
     let mut simulation =
-        Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
+        Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let mut highest = 0.0_f32;
     for _ in 0..60 {
         simulation.step(1.0 / 60.0).expect("a step");

@@ -166,7 +166,7 @@ fn travel(floor: Floor, cases: &[Case]) -> Vec<Journey> {
     let mut world = floor.build();
     let bodies: Vec<usize> = cases.iter().map(|case| world.add(case.body())).collect();
     let config = SolverConfig::default().without_sleep();
-    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a simulation");
+    let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a simulation");
     let mut journeys = vec![Journey { lost: f32::NAN, hop: 0.0 }; cases.len()];
     for step in 1..=cases.iter().map(Case::steps).max().unwrap_or(0) {
         simulation.step(DT).expect("a step");
@@ -258,7 +258,7 @@ fn a_wall_a_step_and_the_end_of_a_row_are_as_they_were() {
         let body = Body::dynamic().shape(shape.clone()).position(-1.0, SIZE, 0.0).velocity(speed * Vec3::X, Vec3::ZERO);
         let body = world.add(body.friction(0.0));
         let config = SolverConfig::default().without_sleep();
-        let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a simulation");
+        let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a simulation");
         for _ in 0..90 {
             simulation.step(1.0 / 60.0).expect("a step");
         }

@@ -5,10 +5,9 @@ use drystone::config::{Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{in_place, rms_speed};
 use drystone::stages::backend::CheckedStep;
-use drystone::stages::compare::compare;
-use drystone::{
-    Backend, Body, BodyKind, Cpu, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepProblem, World,
-};
+use drystone::{Backend, Body, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone_conform::compare::compare;
+use drystone_scenes::Scene;
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -18,7 +17,7 @@ fn find(name: &str, parameters: &[&str]) -> Scene {
 }
 
 fn started(scene: &Scene, config: SolverConfig) -> Simulation {
-    Simulation::new(scene.world.clone(), config.without_sleep(), Box::new(Cpu::new())).expect("a good scene")
+    Simulation::with(scene.world.clone(), config.without_sleep(), Box::new(Cpu::new())).expect("a good scene")
 }
 
 fn run(simulation: &mut Simulation, steps: u32) {
@@ -65,7 +64,7 @@ fn what_walls_hold_takes_no_more_substeps_than_its_weight_asks_for() {
     let cube = world.add(Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(0.0, 0.2, 0.0));
     let start = |world: World| {
         let config = SolverConfig::default().without_sleep();
-        Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world")
+        Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world")
     };
     let mut free = world.clone();
     let wall = |x: f32| Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0);
@@ -99,8 +98,7 @@ fn what_a_press_holds_lies_still_and_sleeps() {
         let crate_ = world.add(block(Body::dynamic()).density(density).position(0.0, 0.5, 0.0));
         let press =
             world.add(block(Body::kinematic()).position(0.0, 1.55, 0.0).velocity(0.1 * Vec3::NEG_Y, Vec3::ZERO));
-        let mut simulation =
-            Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+        let mut simulation = Simulation::new(world).expect("a good world");
         for step in 0..600 {
             if simulation.world.bodies[press].position.y < 1.5 - depth {
                 simulation.world.bodies[press].linear_velocity = Vec3::ZERO;
@@ -163,7 +161,7 @@ fn a_net_that_catches_a_heavy_ball_keeps_its_joints_closed() {
     let ball = world.bodies[0].clone().density(300_000.0).position(0.0, 1.6, 0.5 * far);
     world.add(ball);
     let largest_gap = |config: SolverConfig| {
-        let mut simulation = Simulation::new(world.clone(), config, Box::new(Cpu::new())).expect("a world");
+        let mut simulation = Simulation::with(world.clone(), config, Box::new(Cpu::new())).expect("a world");
         (0..360).fold(0.0_f32, |gap, _| {
             simulation.step(DT).expect("a step");
             gap.max(simulation.world.joint_gap())
@@ -457,7 +455,7 @@ fn a_sledge_comes_out_of_a_wall() {
     let knob = Shape::cuboid(0.1, 0.1, 0.1);
     let sledge = Body::dynamic().shape(Shape::cuboid(1.0, 0.1, 0.5)).position(-3.0, 0.1, 0.0);
     world.add(sledge.shape_at(knob, Vec3::new(0.9, 0.2, 0.0), Quat::IDENTITY));
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+    let mut simulation = Simulation::new(world).expect("a good world");
     run(&mut simulation, 60);
     let deepest = simulation.penetration().max;
     assert!(deepest > 0.5, "{deepest} m");

@@ -1,13 +1,13 @@
 //! Constraints make no energy (docs/derivation.md, section 11).
 
 use drystone::glam::{Quat, Vec3};
-use drystone::scenes::CATALOGUE;
 use drystone::{Axis, Body, BodyHandle, Cpu, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::CATALOGUE;
 
 const DT: f32 = 1.0 / 60.0;
 
 fn started(world: World) -> Simulation {
-    Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
+    Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
 }
 
 fn energy(world: &World) -> f64 {
@@ -59,7 +59,7 @@ fn what_would_be_torn_apart_keeps_its_momentum() {
         world.join(Joint::new(pair[0], Vec3::new(0.5, 0.0, 0.0), pair[1], Vec3::new(-0.5, 0.0, 0.0)));
     }
     let config = SolverConfig::default().without_sleep();
-    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world");
+    let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world");
     let before = simulation.world.linear_momentum();
     let [most, _] = most_energy(&mut simulation, 600);
     let after = simulation.world.linear_momentum();

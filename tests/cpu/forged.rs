@@ -1,13 +1,14 @@
 //! Saved runs that someone forged, whose hash fits: one clear line, or steps without a panic.
 
-use drystone::{Cpu, Scene, Simulation, SolverConfig};
+use drystone::{Cpu, Simulation};
+use drystone_scenes::Scene;
 
 /// Bytes before the content: magic, version, hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 
 fn saved(spec: &str, steps: usize) -> Vec<u8> {
     let scene = Scene::find_spec(spec).expect("a scene");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new())).expect("a world");
+    let mut simulation = Simulation::new(scene.world).expect("a world");
     (0..steps).for_each(|_| drop(simulation.step(scene.dt).expect("a step")));
     simulation.save()
 }

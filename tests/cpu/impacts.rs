@@ -18,7 +18,7 @@ fn fallen_flat(half_extents: Vec3, restitution: f32, height: f32) -> [f32; 4] {
         0.0,
     ));
     let config = SolverConfig::default().without_sleep();
-    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world");
+    let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world");
     let [mut bounced, mut fastest, mut spin] = [0.0_f32; 3];
     let mut has_met = false;
     for _ in 0..100 {
@@ -61,7 +61,7 @@ fn a_plate_bounces_flat() {
 }
 
 fn started(world: World) -> Simulation {
-    Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
+    Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
 }
 
 /// A shape of 0.1 to 0.5 m.

@@ -4,8 +4,8 @@ use std::f32::consts::FRAC_PI_2;
 
 use drystone::glam::{Mat3, Quat, Vec3};
 use drystone::metrics::fastest;
-use drystone::scenes::CATALOGUE;
-use drystone::{Body, Cpu, MassProperties, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, MassProperties, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::{CATALOGUE, Scene};
 
 const DT: f32 = 1.0 / 60.0;
 /// m r² over the inertia of a cube, r from its center to the middle of an edge.
@@ -24,14 +24,14 @@ fn on_a_floor(body: Body, substeps: u32) -> Simulation {
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     world.add(body);
     let config = SolverConfig::default().with(|c| c.substeps = substeps).without_sleep();
-    Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world")
+    Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world")
 }
 
 /// The moments of inertia with which a body is simulated.
 fn simulated(body: &Body) -> Vec3 {
     let mut world = World::new();
     world.add(body.clone());
-    let simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good body");
+    let simulation = Simulation::new(world).expect("a good body");
     simulation.world.bodies[0].mass.principal_inertia
 }
 
@@ -71,7 +71,7 @@ fn no_solid_of_even_density_is_raised() {
     for entry in CATALOGUE {
         let world = Scene::find(entry.name, &[]).expect(entry.name).world;
         let before: Vec<_> = world.bodies.iter().map(|body| body.mass).collect();
-        let simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect(entry.name);
+        let simulation = Simulation::new(world).expect(entry.name);
         let after: Vec<_> = simulation.world.bodies.iter().map(|body| body.mass).collect();
         assert_eq!(before, after, "{}", entry.name);
         bodies += after.len();

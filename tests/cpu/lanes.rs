@@ -1,8 +1,9 @@
 //! Sixteen lanes and all threads against one constraint at a time: the same bits.
 
 use crate::common::settings::set;
-use drystone::stages::compare::{Comparison, compare};
-use drystone::{Backend, Cpu, Reference, Scene, SolverConfig};
+use drystone::{Backend, Cpu, Reference, SolverConfig};
+use drystone_conform::compare::{Comparison, compare};
+use drystone_scenes::Scene;
 
 /// Compares a backend with the reference on a scene of the catalogue, on a pool of `threads`.
 fn against_reference(

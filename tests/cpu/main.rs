@@ -6,29 +6,24 @@ mod common {
     pub mod contacts;
     pub mod counting;
     pub mod efforts;
-    #[cfg(feature = "serde")]
     pub mod settings;
     pub mod state;
 
     #[cfg(feature = "gpu")]
-    pub use drystone::stages::conform::{passes as kernels, random};
+    pub use drystone_conform::{passes as kernels, random};
 }
 
-#[cfg(feature = "serde")]
 #[path = "../laws/mod.rs"]
 #[allow(dead_code)]
 mod laws;
-#[cfg(feature = "serde")]
 #[path = "../laws/own.rs"]
 mod laws_own;
-#[cfg(feature = "serde")]
 #[path = "../laws/properties.rs"]
 mod laws_properties;
 
 mod allocations;
 mod batch;
 mod changes;
-#[cfg(feature = "serde")]
 mod checked;
 mod compare;
 mod contacts;
@@ -42,7 +37,6 @@ mod forged;
 mod graph;
 mod impacts;
 mod inertia;
-#[cfg(feature = "serde")]
 mod lanes;
 mod newton;
 mod oracle;

@@ -2,10 +2,11 @@
 
 use crate::common::contacts::{FRICTION, tower};
 use drystone::config::Method;
-use drystone::contacts::{ContactProblem, LocalProblem, Operator};
-use drystone::residuals::Residuals;
-use drystone::solver::newton::{Blocks, Bodies, Ended, NewtonEnded, Outcome, Sweeps, System, newton};
-use drystone::{Cpu, Scene, Simulation, SolverConfig};
+use drystone::{Cpu, Simulation, SolverConfig};
+use drystone_problems::contacts::{ContactProblem, LocalProblem, Operator};
+use drystone_problems::residuals::Residuals;
+use drystone_problems::solver::newton::{Blocks, Bodies, Ended, NewtonEnded, Outcome, Sweeps, System, newton};
+use drystone_scenes::Scene;
 use glam::{DMat3, DVec3};
 
 /// The error that every problem is solved to.
@@ -48,9 +49,9 @@ fn steps() -> Vec<ContactProblem> {
         let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
         let scene = Scene::find(name, &parameters).expect("a scene of the catalogue");
         let config = SolverConfig::default().without_sleep();
-        let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new())).expect("it is sound");
+        let mut simulation = Simulation::with(scene.world, config, Box::new(Cpu::new())).expect("it is sound");
         (0..steps).for_each(|_| drop(simulation.step(1.0 / 60.0).expect("a step")));
-        simulation.step_with_contacts(name, 1.0 / 60.0).expect("no joints").0
+        drystone_problems::step_with_contacts(&mut simulation, name, 1.0 / 60.0).expect("no joints").0
     };
     scenes.map(problem).into()
 }
@@ -101,7 +102,7 @@ fn more_contacts_than_freedoms_are_no_obstacle() {
     let ground = problem.contacts[0];
     for i in 0..12 {
         let r_b = DVec3::new(0.5 - 0.09 * f64::from(i), 0.04 * f64::from(i) - 0.2, -0.5);
-        problem.contacts.push(drystone::contacts::PointContact { r_b, ..ground });
+        problem.contacts.push(drystone_problems::contacts::PointContact { r_b, ..ground });
     }
     problem.bodies[0].free.linear.x += 0.3;
     problem.bodies[1].free.angular.z += 0.2;

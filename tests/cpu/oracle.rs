@@ -9,11 +9,12 @@ use crate::common::contacts::tower;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus};
-use drystone::contacts::{ContactProblem, FreeBody, Operator, Velocity};
-use drystone::residuals::Residuals;
-use drystone::solver::newton::{Bodies, NewtonEnded, newton};
-use drystone::solver::{Solution, solution};
-use drystone::{Cpu, Scene, Simulation, SolverConfig};
+use drystone::{Cpu, Simulation, SolverConfig};
+use drystone_problems::contacts::{ContactProblem, FreeBody, Operator, Velocity};
+use drystone_problems::residuals::Residuals;
+use drystone_problems::solver::newton::{Bodies, NewtonEnded, newton};
+use drystone_problems::solver::{Solution, solution};
+use drystone_scenes::Scene;
 use glam::{DVec2, DVec3};
 
 /// What the interior point method is asked for: more than that it does not reach.
@@ -116,12 +117,12 @@ fn exact(problem: &ContactProblem) -> Solution {
 /// A pile of six boxes as it lands.
 fn pile() -> ContactProblem {
     let scene = Scene::find("pile", &["n=6".into()]).expect("a scene of the catalogue");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))
+    let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))
         .expect("it is sound");
     for _ in 0..30 {
         simulation.step(1.0 / 60.0).expect("a step");
     }
-    simulation.step_with_contacts("pile", 1.0 / 60.0).expect("no joints").0
+    drystone_problems::step_with_contacts(&mut simulation, "pile", 1.0 / 60.0).expect("no joints").0
 }
 
 /// Towers of equal and unequal boxes and a pile, with one friction coefficient.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 const DT: f32 = 1.0 / 60.0;
 
 fn simulation(world: World) -> Simulation {
-    Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new())).expect("a world")
+    Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new())).expect("a world")
 }
 
 fn weightless() -> World {

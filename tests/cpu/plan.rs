@@ -2,13 +2,14 @@
 
 use drystone::stages::plan::Kernel;
 use drystone::stages::problem::ContactSummary;
-use drystone::{Backend, Body, Joint, Reference, Scene, Shape, Simulation, SolverConfig, StepPlan, World};
+use drystone::{Backend, Body, Joint, Reference, Shape, Simulation, SolverConfig, StepPlan, World};
+use drystone_scenes::Scene;
 use glam::Vec3;
 
 /// The plan of a world's next step and the bytes that its kernels move, and the simulation for what else is of interest.
 fn planned(world: World, config: SolverConfig) -> (StepPlan, u64, Simulation) {
     let backend = Box::new(Reference::<f32>::new());
-    let mut simulation = Simulation::new(world, config, backend).expect("good settings");
+    let mut simulation = Simulation::with(world, config, backend).expect("good settings");
     let (problem, plan) = simulation.next_problem(1.0 / 60.0).expect("a step");
     let bytes = plan.bytes_moved(&problem, &ContactSummary::of(&problem));
     (plan, bytes, simulation)
@@ -288,7 +289,7 @@ fn bodies_with_equal_moments_of_inertia_need_no_tensor_and_move_the_same() {
     let scene = Scene::find("pile", &["n=60".into()]).expect("the scene");
     let backend = Box::new(Reference::<f32>::new());
     let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default().without_sleep(), backend).expect("good settings");
+        Simulation::with(scene.world, SolverConfig::default().without_sleep(), backend).expect("good settings");
     for _ in 0..80 {
         simulation.step(1.0 / 60.0).expect("a step");
     }
@@ -323,7 +324,7 @@ fn a_plan_is_kept_only_while_it_is_that_of_its_problem() {
     // All islands are in one block.
     let config = SolverConfig::default().without_sleep().with(|c| c.max_substeps = c.substeps);
     let backend = Box::new(Reference::<f32>::new());
-    let mut simulation = Simulation::new(one_lies_and_one_hangs(), config.clone(), backend).expect("good settings");
+    let mut simulation = Simulation::with(one_lies_and_one_hangs(), config.clone(), backend).expect("good settings");
     let mut isotropic = [0; 2];
     for step in 0..6 {
         let (problem, plan) = simulation.next_problem(1.0 / 60.0).expect("a step");

@@ -4,14 +4,14 @@ use crate::common::random::Random;
 use drystone::glam::{Quat, Vec3};
 use drystone::queries::{Filter, Found, Hit, Queries};
 use drystone::world::MOST_LENGTH;
-use drystone::{Body, BodyKind, Cpu, Groups, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyKind, Groups, Shape, Simulation, World};
 use parry3d::math::Pose;
 use parry3d::query::{self, Ray, ShapeCastOptions};
 
 const DT: f32 = 1.0 / 60.0;
 
 fn simulation(world: World) -> Simulation {
-    Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world")
+    Simulation::new(world).expect("a good world")
 }
 
 fn hull() -> Shape {

@@ -4,9 +4,9 @@ use crate::common::state::reference;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::{
-    Backend, Body, BodyKind, Cpu, Groups, Joint, Recorder, RecordingIntervals, Reference, Replay, Result, Scene, Shape,
-    Simulation, SolverConfig, World,
+    Backend, Body, BodyKind, Cpu, Groups, Joint, Reference, Result, Shape, Simulation, SolverConfig, World,
 };
+use drystone_scenes::{Recorder, RecordingIntervals, Replay, Scene};
 
 const DT: f32 = 1.0 / 60.0;
 const INTERVALS: RecordingIntervals = RecordingIntervals { hash: 5, state: 20 };
@@ -31,7 +31,7 @@ fn towers() -> World {
 /// Steps a world 120 times and changes it in every way on its way; the recording, and the simulation at its end.
 fn recorded() -> (Vec<u8>, Simulation) {
     let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
-    let mut simulation = Simulation::new(towers(), config, reference()).expect("a world");
+    let mut simulation = Simulation::with(towers(), config, reference()).expect("a world");
     let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, INTERVALS).expect("memory");
     let mut kept = None;
     for step in 0..120 {
@@ -91,7 +91,7 @@ fn a_replay_goes_the_same_way_on_any_backend_and_from_any_step() {
 /// A recording of 30 steps, of which the caller does something else before the 11th; and the hash of its end.
 fn recorded_with(interrupt: impl Fn(&mut Simulation)) -> (Vec<u8>, u64) {
     let config = SolverConfig::default().without_sleep();
-    let mut simulation = Simulation::new(towers(), config, reference()).expect("a world");
+    let mut simulation = Simulation::with(towers(), config, reference()).expect("a world");
     let intervals = RecordingIntervals { hash: 1, ..INTERVALS };
     let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, intervals).expect("memory");
     for step in 0..30 {
@@ -110,10 +110,10 @@ fn recorded_with(interrupt: impl Fn(&mut Simulation)) -> (Vec<u8>, u64) {
 #[test]
 fn a_simulation_that_another_one_replaced_is_recorded() {
     let begun_anew = |s: &mut Simulation| {
-        *s = Simulation::new(s.world.clone(), s.config().clone(), reference()).expect("a world");
+        *s = Simulation::with(s.world.clone(), s.config().clone(), reference()).expect("a world");
     };
     let loaded = |s: &mut Simulation| {
-        let mut other = Simulation::new(towers(), s.config().clone(), reference()).expect("a world");
+        let mut other = Simulation::with(towers(), s.config().clone(), reference()).expect("a world");
         (0..3).for_each(|_| drop(other.step(DT).expect("a step")));
         *s = Simulation::load(&other.save(), reference()).expect("what was saved");
     };
@@ -168,7 +168,7 @@ fn a_replay_that_goes_another_way_names_the_step_and_the_body() {
         let mut world = towers();
         // A vacancy before the body of the mistake.
         world.remove(world.bodies.handle(2).expect("a cube"));
-        let mut simulation = Simulation::new(world, config, reference()).expect("a world");
+        let mut simulation = Simulation::with(world, config, reference()).expect("a world");
         let intervals = RecordingIntervals { hash, ..INTERVALS };
         let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, intervals).expect("memory");
         (0..50).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
@@ -183,7 +183,7 @@ fn a_replay_that_goes_another_way_names_the_step_and_the_body() {
 
 #[test]
 fn what_is_no_whole_recording_is_refused_in_one_line() {
-    let mut simulation = Simulation::new(towers(), SolverConfig::default(), reference()).expect("a world");
+    let mut simulation = Simulation::with(towers(), SolverConfig::default(), reference()).expect("a world");
     let mut recorder = Recorder::new(Vec::new(), "towers", &mut simulation, INTERVALS).expect("memory");
     (0..8).for_each(|_| drop(recorder.step(&mut simulation, DT).expect("a step")));
     let bytes = recorder.finish().expect("memory");
@@ -206,7 +206,7 @@ fn what_is_no_whole_recording_is_refused_in_one_line() {
 #[test]
 fn a_world_that_the_caller_leaves_alone_takes_few_bytes_a_step() {
     let scene = Scene::find("pile", &["n=500".into()]).expect("a scene");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference()).expect("a world");
+    let mut simulation = Simulation::with(scene.world, SolverConfig::default(), reference()).expect("a world");
     let rare = RecordingIntervals { hash: 1000, state: 1000 };
     let mut recorder = Recorder::new(Vec::new(), "pile", &mut simulation, rare).expect("memory");
     let begin = simulation.save().len();

@@ -1,9 +1,9 @@
 //! Residuals: nothing at a known solution, something beside it, and the same whatever the axes and the units.
 
 use crate::common::contacts::{FRICTION, GRAVITY, STEP, bearing, tower};
-use drystone::ContactProblem;
-use drystone::contacts::{Operator, Velocity};
-use drystone::residuals::{Measure, Residuals};
+use drystone_problems::ContactProblem;
+use drystone_problems::contacts::{Operator, Velocity};
+use drystone_problems::residuals::{Measure, Residuals};
 use glam::{DQuat, DVec3};
 
 /// A box that slides at 3 m/s: friction takes mu g h of it, and tilts the weight onto the front edge. Friction of

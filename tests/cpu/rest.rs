@@ -3,13 +3,14 @@
 use drystone::config::{FrictionAt, Stabilization};
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::rms_speed;
-use drystone::stages::compare::Difference;
-use drystone::{Body, BodyKind, Cpu, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyKind, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+use drystone_conform::compare::Difference;
+use drystone_scenes::Scene;
 
 const DT: f32 = 1.0 / 60.0;
 
 fn started(world: &World, config: SolverConfig) -> Simulation {
-    Simulation::new(world.clone(), config, Box::new(Cpu::new())).expect("a good world")
+    Simulation::with(world.clone(), config, Box::new(Cpu::new())).expect("a good world")
 }
 
 fn awake() -> SolverConfig {
@@ -240,7 +241,7 @@ fn a_body_that_is_placed_later_is_borne_at_once() {
         let late = world.add(cube().position(10.0, 0.5, 0.0));
         let mut both = [
             started(&world, config.clone()),
-            Simulation::new(world, config, Box::new(Reference::<f32>::new())).expect("a good world"),
+            Simulation::with(world, config, Box::new(Reference::<f32>::new())).expect("a good world"),
         ];
         for simulation in &mut both {
             run(simulation, 100);

@@ -2,7 +2,8 @@
 
 use crate::common::counting;
 use drystone::glam::Vec3;
-use drystone::{Cpu, Rollback, Scene, Simulation, SolverConfig};
+use drystone::{Cpu, Rollback, Simulation, SolverConfig};
+use drystone_scenes::Scene;
 
 #[allow(dead_code)]
 #[path = "../../examples/rollback.rs"]
@@ -10,7 +11,7 @@ mod example;
 
 fn pile(config: &SolverConfig) -> (Simulation, f32) {
     let scene = Scene::find("pile", &["n=200".into()]).expect("the scene");
-    (Simulation::new(scene.world, config.clone(), Box::new(Cpu::new())).expect("good settings"), scene.dt)
+    (Simulation::with(scene.world, config.clone(), Box::new(Cpu::new())).expect("good settings"), scene.dt)
 }
 
 /// The calls that `work` makes for memory.

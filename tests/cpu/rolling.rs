@@ -25,7 +25,7 @@ fn a_ball_rolls_on_a_board_that_tilts_as_on_paper() {
     let mut world = turning_board(rate);
     let ball = world.add(Body::dynamic().density(7800.0).shape(Shape::ball(radius)).position(0.0, radius, 0.0));
     let mut simulation =
-        Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
+        Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let (mut paper, mut v, h) = (0.0, -f64::from(rate * radius), 1e-5);
     let mut time = 0.0;
     for _ in 0..60 {
@@ -48,7 +48,7 @@ fn a_block_on_a_board_that_tilts_slowly_slips_at_the_angle_of_friction() {
     let mut world = turning_board(rate);
     let block = world.add(Body::dynamic().shape(Shape::cuboid(0.2, 0.05, 0.2)).position(0.0, 0.05, 0.0));
     let mut simulation =
-        Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
+        Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let mut angle = 0.0;
     while along_board(&simulation, block) < 1e-3 {
         simulation.step(dt).expect("a step");

@@ -4,9 +4,10 @@ use crate::common::state::reference;
 use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::{
-    Backend, Body, BodyHandle, BodyKind, CombineRule, Cpu, Joint, Material, Scene, Shape, Simulation, SolverConfig,
-    StepStats, World,
+    Backend, Body, BodyHandle, BodyKind, CombineRule, Cpu, Joint, Material, Shape, Simulation, SolverConfig, StepStats,
+    World,
 };
+use drystone_scenes::Scene;
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -30,7 +31,7 @@ fn counts(stats: &StepStats) -> impl PartialEq + std::fmt::Debug {
 /// from two steps later. All have the same bits in every step after that, and leave the same state behind. `change` changes the world before a
 /// step.
 fn goes_on(what: &str, world: &World, config: &SolverConfig, steps: u32, moments: &[u32], change: fn(u32, &mut World)) {
-    let mut whole = Simulation::new(world.clone(), config.clone(), cpu()).expect("a good world");
+    let mut whole = Simulation::with(world.clone(), config.clone(), cpu()).expect("a good world");
     let mut others: Vec<(String, Simulation)> = Vec::new();
     for step in 0..steps {
         change(step, &mut whole.world);
@@ -146,7 +147,7 @@ fn bodies_with_materials_of_shapes_go_on_to_the_same_bits() {
 fn islands_of_higher_effort_go_on_to_the_same_bits() {
     let world = scene("mass-ratio", &[]);
     goes_on("mass-ratio", &world, &SolverConfig::default(), 60, &[1, 20], unchanged);
-    let mut simulation = Simulation::new(world, SolverConfig::default(), cpu()).expect("a good world");
+    let mut simulation = Simulation::with(world, SolverConfig::default(), cpu()).expect("a good world");
     let efforts: Vec<_> = (0..20).map(|_| simulation.step(DT).expect("a step").efforts).collect();
     assert!(efforts.iter().any(|counts| counts[1..].iter().any(|&count| count > 0)), "{efforts:?}");
 }
@@ -253,14 +254,14 @@ fn all_settings_go_on() {
         c.rules.slip_friction = true;
     });
     goes_on("settings", &scene("pile", &["n=40"]), &config, 60, &[20], unchanged);
-    let mut simulation = Simulation::new(scene("stack", &[]), config.clone(), cpu()).expect("a good world");
+    let mut simulation = Simulation::with(scene("stack", &[]), config.clone(), cpu()).expect("a good world");
     let loaded = Simulation::load(&simulation.save(), cpu()).expect("the bytes of a run");
     assert_eq!(*loaded.config(), config);
 }
 
 #[test]
 fn settings_that_change_after_a_state_was_saved_have_the_same_effect() {
-    let mut one = Simulation::new(scene("pile", &["n=60"]), SolverConfig::default(), cpu()).expect("a good world");
+    let mut one = Simulation::with(scene("pile", &["n=60"]), SolverConfig::default(), cpu()).expect("a good world");
     (0..100).for_each(|_| drop(one.step(DT).expect("a step")));
     one.set_config(SolverConfig::default().with(|c| c.substeps = 4)).expect("good settings");
     let mut other = Simulation::load(&one.save(), reference()).expect("the bytes of a run");
@@ -286,7 +287,7 @@ fn handles_name_the_same_bodies_and_joints_after_loading() {
     let joints = [0, 1].map(|i| world.insert_joint(Joint::new(i, Vec3::X, i + 1, -Vec3::X)));
     world.remove_joint(joints[0]);
     world.remove(bodies[3]);
-    let mut simulation = Simulation::new(world, SolverConfig::default(), cpu()).expect("a good world");
+    let mut simulation = Simulation::with(world, SolverConfig::default(), cpu()).expect("a good world");
     let mut loaded = Simulation::load(&simulation.save(), cpu()).expect("the bytes of a run");
     assert!(loaded.world.body(bodies[3]).is_none() && loaded.world.joint(joints[0]).is_none());
     assert_eq!(loaded.world.body(bodies[2]).expect("a cube").name, "cube 2");
@@ -301,7 +302,7 @@ fn small() -> Vec<u8> {
     for i in 0..2 {
         world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
     }
-    let mut simulation = Simulation::new(world, SolverConfig::default(), cpu()).expect("a good world");
+    let mut simulation = Simulation::with(world, SolverConfig::default(), cpu()).expect("a good world");
     (0..5).for_each(|_| drop(simulation.step(DT).expect("a step")));
     simulation.save()
 }
@@ -340,7 +341,7 @@ fn a_hash_is_what_its_definition_says() {
     world.remove(gone);
     world.add(Body::dynamic().shape(Shape::ball(0.5)).position(1.0, -0.0, 3.0).velocity(Vec3::X, Vec3::Y));
     assert_eq!(world.bodies.len(), 2);
-    let simulation = Simulation::new(world, SolverConfig::default(), cpu()).expect("a good world");
+    let simulation = Simulation::with(world, SolverConfig::default(), cpu()).expect("a good world");
     let numbers = |index: u32, generation: u32, floats: [f32; 13]| {
         [index, generation].into_iter().chain(floats.map(f32::to_bits)).collect::<Vec<_>>()
     };
@@ -355,7 +356,7 @@ fn a_hash_is_what_its_definition_says() {
 #[test]
 fn a_pile_at_rest_takes_few_bytes_a_body() {
     let mut simulation =
-        Simulation::new(scene("pile", &["n=200"]), SolverConfig::default(), cpu()).expect("a good world");
+        Simulation::with(scene("pile", &["n=200"]), SolverConfig::default(), cpu()).expect("a good world");
     (0..400).for_each(|_| drop(simulation.step(DT).expect("a step")));
     assert_eq!((0..simulation.world.bodies.len()).filter(|&body| simulation.is_asleep(body)).count(), 200);
     let bytes = simulation.save().len() / 200;
@@ -366,7 +367,7 @@ fn a_pile_at_rest_takes_few_bytes_a_body() {
 #[test]
 fn bytes_are_the_same_for_any_number_of_threads() {
     let mut simulation =
-        Simulation::new(scene("pile", &["n=700"]), SolverConfig::default(), cpu()).expect("a good world");
+        Simulation::with(scene("pile", &["n=700"]), SolverConfig::default(), cpu()).expect("a good world");
     (0..60).for_each(|_| drop(simulation.step(DT).expect("a step")));
     let bytes = simulation.save();
     for threads in [1, 3] {
@@ -405,7 +406,7 @@ fn bytes_that_end_anywhere_are_refused_without_help_of_the_hash() {
 #[test]
 fn a_world_that_was_replaced_is_saved_before_the_next_step() {
     for other in [scene("tower", &["n=4"]), scene("pile", &["n=80"])] {
-        let mut one = Simulation::new(scene("pile", &["n=40"]), SolverConfig::default(), cpu()).expect("a good world");
+        let mut one = Simulation::with(scene("pile", &["n=40"]), SolverConfig::default(), cpu()).expect("a good world");
         (0..60).for_each(|_| drop(one.step(DT).expect("a step")));
         one.world = other;
         let mut loaded = Simulation::load(&one.save(), reference()).expect("the bytes of a run");

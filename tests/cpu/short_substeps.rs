@@ -9,7 +9,7 @@ fn cube() -> Body {
 
 fn simulation(world: World, substeps: u32) -> Simulation {
     let config = SolverConfig::default().without_sleep().with(|c| c.substeps = substeps);
-    Simulation::new(world, config, Box::new(Reference::<f32>::new())).expect("good settings")
+    Simulation::with(world, config, Box::new(Reference::<f32>::new())).expect("good settings")
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What lies still sleeps, stays where it is, costs nothing, and wakes when it is disturbed.
 
-use drystone::{Axis, Body, Cpu, Joint, Scene, Shape, Simulation, SolverConfig, StepStats, World};
+use drystone::{Axis, Body, Cpu, Joint, Shape, Simulation, SolverConfig, StepStats, World};
+use drystone_scenes::Scene;
 use glam::{Quat, Vec3};
 
 const DT: f32 = 1.0 / 60.0;
@@ -10,7 +11,7 @@ fn sleepy() -> SolverConfig {
 }
 
 fn simulation(world: World, config: SolverConfig) -> Simulation {
-    Simulation::new(world, config, Box::new(Cpu::new())).expect("good settings")
+    Simulation::with(world, config, Box::new(Cpu::new())).expect("good settings")
 }
 
 fn run(simulation: &mut Simulation, steps: u32) -> StepStats {

@@ -2,12 +2,13 @@
 
 use drystone::config::FrictionAt;
 use drystone::glam::Vec3;
-use drystone::{Body, Cpu, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 const DT: f32 = 1.0 / 60.0;
 
 fn simulation(world: World) -> Simulation {
-    Simulation::new(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
+    Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
 }
 
 fn run(simulation: &mut Simulation, steps: u32) {
@@ -63,7 +64,7 @@ fn begins_without_impulses(friction_at: FrictionAt) {
         world.add(ball(10.0 + 2.0 * i as f32, 0.5));
     }
     let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at);
-    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world");
+    let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world");
     run(&mut simulation, 120);
     // It slides, so that friction acts.
     simulation.world.bodies[first].linear_velocity = Vec3::Z * 5.0;

@@ -3,9 +3,9 @@
 use drystone::config::JointSolver;
 use drystone::glam::{EulerRot, Quat, Vec3};
 use drystone::{
-    Axis, Body, BodyHandle, Bounds, Cpu, Drive, Joint, Linear, MassProperties, Scene, Shape, Simulation, SolverConfig,
-    World,
+    Axis, Body, BodyHandle, Bounds, Cpu, Drive, Joint, Linear, MassProperties, Shape, Simulation, SolverConfig, World,
 };
+use drystone_scenes::Scene;
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -35,7 +35,7 @@ impl Case {
     /// Positions of the centers of mass after each of some steps.
     fn run(&self, steps: usize) -> Vec<Vec<Vec3>> {
         let backend = Box::new(Cpu::new());
-        let mut simulation = Simulation::new(self.world.clone(), self.config.clone(), backend).expect("a world");
+        let mut simulation = Simulation::with(self.world.clone(), self.config.clone(), backend).expect("a world");
         let step = |_| {
             simulation.step(self.dt).expect("a step");
             simulation.world.bodies.iter().map(Body::center_of_mass).collect()

@@ -36,7 +36,7 @@ fn floor() -> World {
 /// Positions of all bodies after `seconds`.
 fn after(world: World, seconds: f32) -> Vec<Vec3> {
     let config = SolverConfig::default().without_sleep();
-    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a world");
+    let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a world");
     for _ in 0..(240.0 * seconds) as usize {
         simulation.step(1.0 / 240.0).expect("a step");
     }

@@ -3,7 +3,7 @@
 use drystone::glam::{Quat, Vec3};
 use drystone::queries::{Filter, Queries};
 use drystone::{
-    Axis, Body, BodyHandle, BodyKind, Cpu, Joint, MassProperties, Reference, Shape, Simulation, SolverConfig, World,
+    Axis, Body, BodyHandle, BodyKind, Joint, MassProperties, Reference, Shape, Simulation, SolverConfig, World,
 };
 
 fn cube() -> Body {
@@ -15,7 +15,7 @@ fn refusal(change: impl FnOnce(&mut World)) -> Option<String> {
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     world.add(cube());
     change(&mut world);
-    let made = Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new()));
+    let made = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()));
     made.err().map(|e| e.to_string())
 }
 
@@ -233,7 +233,7 @@ fn a_handle_of_another_world_names_nothing() {
     let copy = mine.clone();
     assert!(copy.body(own).is_some() && copy.joint(own_joint).is_some() && copy.body(other).is_none());
     let backend = || Box::new(Reference::<f32>::new());
-    let mut simulation = Simulation::new(mine, SolverConfig::default(), backend()).expect("a world");
+    let mut simulation = Simulation::with(mine, SolverConfig::default(), backend()).expect("a world");
     assert_eq!(simulation.contacts_of(other).count(), 0);
     let bytes = simulation.save();
     let mut fork = simulation.fork(backend());
@@ -241,7 +241,7 @@ fn a_handle_of_another_world_names_nothing() {
     fork.restore(&simulation.snapshot());
     assert!(fork.world.body(own).is_some() && fork.world.body(other).is_none());
     // The bytes do not tell which world of the process it was.
-    let saved = |world| Simulation::new(world, SolverConfig::default(), backend()).expect("a world").save();
+    let saved = |world| Simulation::with(world, SolverConfig::default(), backend()).expect("a world").save();
     assert!(saved(theirs) == saved(made().0));
     let mut loaded = Simulation::load(&bytes, backend()).expect("what was saved");
     assert!(loaded.world.body(own).is_some() && loaded.world.joint(own_joint).is_some());
@@ -287,7 +287,7 @@ fn there_is_no_world_beyond_the_last() {
     assert_eq!((line.as_str(), world.bodies.len()), ("world 1: the worlds beside each other are 0 to 0", 0));
     assert_eq!(world.gravity_on(3), Vec3::ZERO);
     let mut simulation =
-        Simulation::new(world, SolverConfig::default(), Box::new(Reference::<f32>::new())).expect("a world");
+        Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new())).expect("a world");
     simulation.wake(7);
     assert!(!simulation.is_asleep(7) && simulation.substeps_of(7) == SolverConfig::default().substeps);
 }
@@ -305,8 +305,14 @@ fn a_joint_of_kinematic_bodies_and_one_of_a_body_that_becomes_fixed_are_taken() 
     let bob = world.add(Body::dynamic().shape(Shape::ball(0.1)).position(2.0, 0.0, 0.0));
     world.join(Joint::new(hand, Vec3::X, arm, Vec3::ZERO).hinge(Vec3::Z));
     world.join(Joint::to_world(bob, Vec3::ZERO, Vec3::X * 2.0));
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+    let mut simulation = Simulation::new(world).expect("a good world");
     simulation.step(0.01).expect("a step");
     simulation.world.bodies[bob].kind = BodyKind::Fixed;
     simulation.step(0.01).expect("a step with a body that is fixed now");
+}
+
+#[test]
+fn a_simulation_of_a_world_alone_has_the_default_settings_on_the_processor() {
+    let simulation = Simulation::new(World::new()).expect("a good world");
+    assert_eq!((simulation.config(), simulation.backend().name()), (&SolverConfig::default(), "cpu"));
 }

@@ -2,7 +2,8 @@
 
 use crate::common::state::{all_bits, bits, reference};
 use drystone::config::FrictionAt;
-use drystone::{Backend, Cpu, Scene, Simulation, SolverConfig, World};
+use drystone::{Backend, Cpu, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 fn cpu() -> Box<dyn Backend> {
     Box::new(Cpu::new())
@@ -14,7 +15,7 @@ fn scene(name: &str, parameters: &[&str], worlds: usize, vary: Option<&str>) -> 
 }
 
 fn end(scene: &Scene, backend: fn() -> Box<dyn Backend>, config: &SolverConfig, steps: u32) -> World {
-    let mut simulation = Simulation::new(scene.world.clone(), config.clone(), backend()).expect("a simulation");
+    let mut simulation = Simulation::with(scene.world.clone(), config.clone(), backend()).expect("a simulation");
     for _ in 0..steps {
         simulation.step(scene.dt).expect("a step");
     }
@@ -83,7 +84,7 @@ fn bodies_of_different_worlds_never_meet() {
     let mut towers = scene("tower", &["n=3"], 3, None);
     let apart = SolverConfig::default().without_sleep();
     let contacts = |scene: &Scene| {
-        let mut simulation = Simulation::new(scene.world.clone(), apart.clone(), cpu()).expect("a simulation");
+        let mut simulation = Simulation::with(scene.world.clone(), apart.clone(), cpu()).expect("a simulation");
         let stats = simulation.step(scene.dt).expect("a step");
         (stats.manifolds, simulation.penetration().max)
     };
@@ -100,7 +101,6 @@ fn what_cannot_stand_beside_each_other_is_refused_in_one_line() {
         Scene::find_worlds(name, &[], worlds, vary).expect_err("a refusal").to_string()
     };
     assert_eq!(refusal("tower", 2, Some("offset")), "tower has no whole number \"offset\" to vary; it has: n");
-    #[cfg(feature = "serde")]
     assert!(refusal("examples/two_boxes.json", 2, Some("n")).contains("being a file"));
     assert!(refusal("pile", 0, None).starts_with("0 worlds of 1000 dynamic bodies"));
     assert!(refusal("pile", 1_000_000, None).contains("at most 4000000 such bodies"));

@@ -3,25 +3,33 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The modules of the library on each floor, the ground floor first.
+/// The modules of the engine on each floor, the ground floor first.
 const LIBRARY: &[&[&str]] = &[
     &["math", "lanes", "random", "error", "memory", "names", "panics", "saved", "stats", "suggest"],
     &["world", "config", "preset"],
     &["collide", "graph"],
-    &["effort", "queries", "load", "scenes"],
-    &["problem", "contacts"],
-    &["kernels", "plan", "metrics", "residuals", "rest", "sleep"],
-    &["backend", "energy", "solver"],
+    &["effort", "queries", "load"],
+    &["problem"],
+    &["kernels", "plan", "metrics", "rest", "sleep"],
+    &["backend", "energy"],
     &["simulation"],
-    &["batch", "compare", "recording"],
-    &["conform"],
+    &["batch"],
     &["stages"],
 ];
 
-/// The modules of the maze game, above the library.
+/// The modules of scenes, above the engine.
+const SCENES: &[&[&str]] = &[&["spawner"], &["scene"], &["catalogue", "spawners", "file"], &["find"], &["recording"]];
+
+/// The modules of contact problems, above the engine.
+const PROBLEMS: &[&[&str]] = &[&["contacts"], &["residuals"], &["solver", "step"], &["batch"]];
+
+/// The modules of comparisons, above the engine and scenes.
+const CONFORM: &[&[&str]] = &[&["compare"], &["conform"]];
+
+/// The modules of the maze game, above the engine.
 const MAZE: &[&[&str]] = &[&["map", "script"], &["board"], &["game"], &["pilot"]];
 
-/// The modules of pictures, above the library and the maze game.
+/// The modules of pictures, above the engine and the maze game.
 const VIEW: &[&[&str]] = &[
     &["poses"],
     &["bounds", "colors"],
@@ -41,8 +49,11 @@ const COMMAND: &[&[&str]] =
 const LIB: &str = include_str!("../../src/lib.rs");
 
 /// The packages: the folder of each, the text of its root, its floors.
-const PACKAGES: [(&str, &str, &[&[&str]]); 4] = [
+const PACKAGES: [(&str, &str, &[&[&str]]); 7] = [
     ("src", LIB, LIBRARY),
+    ("scenes/src", include_str!("../../scenes/src/lib.rs"), SCENES),
+    ("problems/src", include_str!("../../problems/src/lib.rs"), PROBLEMS),
+    ("conform/src", include_str!("../../conform/src/lib.rs"), CONFORM),
     ("maze/src", include_str!("../../maze/src/lib.rs"), MAZE),
     ("view/src", include_str!("../../view/src/lib.rs"), VIEW),
     ("cli/src", include_str!("../../cli/src/lib.rs"), COMMAND),

@@ -3,7 +3,7 @@
 use drystone::backend::{BackendChoice, BackendKind};
 use drystone::config::{Method, Stabilization};
 use drystone::preset::Preset;
-use drystone::solver::Order;
+use drystone_problems::solver::Order;
 
 #[test]
 fn a_name_is_read_back_and_another_is_refused_with_the_list() {
@@ -16,7 +16,6 @@ fn a_name_is_read_back_and_another_is_refused_with_the_list() {
     assert_eq!("auto".parse::<BackendChoice>().expect("a choice"), BackendChoice::Auto);
 }
 
-#[cfg(feature = "serde")]
 #[test]
 fn serde_knows_the_same_names() {
     fn same<T: serde::Serialize + std::fmt::Display>(all: impl IntoIterator<Item = T>) {

@@ -117,7 +117,7 @@ impl Sources {
 
     /// Whether a block of type `of` declares `name`, or a file of module `of` has it or its name.
     fn has_item(&self, of: &str, name: &str) -> bool {
-        if of == "drystone" {
+        if of == "drystone" || of.starts_with("drystone_") {
             return true;
         }
         if of.starts_with(|c: char| c.is_ascii_uppercase()) {

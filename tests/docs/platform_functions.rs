@@ -48,11 +48,11 @@ const FUNCTIONS: &[&str] = &[
 
 /// What may: a file or folder, the name, and why no step depends on it.
 const ALLOWED: &[(&str, &str, &str)] = &[
-    ("src/solver/", "hypot", "solves one contact problem in double precision"),
-    ("src/solver/", "ln", "the time that Newton's method takes"),
-    ("src/solver/", "powi", "Newton's method"),
+    ("problems/src/solver/", "hypot", "solves one contact problem in double precision"),
+    ("problems/src/solver/", "ln", "the time that Newton's method takes"),
+    ("problems/src/solver/", "powi", "Newton's method"),
     ("src/metrics.rs", "hypot", "a measurement"),
-    ("src/conform/", "sin_cos", "random problems, whose rows kernels and shaders read alike"),
+    ("conform/src/", "sin_cos", "random problems, whose rows kernels and shaders read alike"),
     ("src/load.rs", "from_rotation_arc", "suggests settings, in double precision"),
 ];
 
@@ -88,7 +88,8 @@ fn asked(code: &str) -> Vec<&'static str> {
 fn no_step_asks_the_platform_for_a_sine() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (mut wrong, mut used) = (Vec::new(), vec![false; ALLOWED.len()]);
-    for path in source_files(&root.join("src")) {
+    let folders = ["src", "scenes/src", "problems/src", "conform/src"].map(|folder| source_files(&root.join(folder)));
+    for path in folders.concat() {
         let name = path.strip_prefix(root).expect("found there").to_string_lossy().replace('\\', "/");
         if TESTS.iter().any(|tests| name.ends_with(tests)) {
             continue;

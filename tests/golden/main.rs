@@ -4,7 +4,8 @@
 
 use std::path::Path;
 
-use drystone::{Backend, Cpu, Reference, Scene, Simulation, SolverConfig, World};
+use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 mod scenes;
 mod table;
@@ -111,7 +112,7 @@ fn the_last_bit_of_a_setting_and_of_a_place_change_the_hash() {
     let pile = |change: fn(&mut SolverConfig, &mut World)| {
         let (mut config, mut world) = (SolverConfig::default(), Scene::find_spec("pile:n=12").expect("a pile").world);
         change(&mut config, &mut world);
-        let mut simulation = Simulation::new(world, config, Box::new(Reference::<f32>::new())).expect("a pile");
+        let mut simulation = Simulation::with(world, config, Box::new(Reference::<f32>::new())).expect("a pile");
         (0..60).for_each(|_| drop(simulation.step(1.0 / 60.0).expect("a step")));
         simulation.hash()
     };

@@ -43,7 +43,7 @@ fn of_substeps(substeps: u32) -> SolverConfig {
 }
 
 fn simulation(world: &World, config: &SolverConfig, open: Open) -> Simulation {
-    Simulation::new(world.clone(), config.clone(), open()).expect("a good world")
+    Simulation::with(world.clone(), config.clone(), open()).expect("a good world")
 }
 
 /// The joints that break in one step, and what they bore (N).

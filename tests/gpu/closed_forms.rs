@@ -36,7 +36,7 @@ tests! {
 }
 
 fn simulation(world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Simulation {
-    Simulation::new(world, config, backend).expect("good settings")
+    Simulation::with(world, config, backend).expect("good settings")
 }
 
 /// Runs `seconds` of `world` in steps of 1/`rate` s, with 4 substeps each, and returns what became of it.

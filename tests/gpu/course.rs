@@ -26,7 +26,7 @@ tests! {
 }
 
 fn simulation(world: World, config: SolverConfig, open: Open) -> Simulation {
-    Simulation::new(world, config, open()).expect("good settings")
+    Simulation::with(world, config, open()).expect("good settings")
 }
 
 /// Whether a step waits for a device, which takes hundreds of times as long as the few bodies of these scenes: fewer steps, then.

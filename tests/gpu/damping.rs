@@ -33,7 +33,7 @@ fn cube() -> Body {
 
 fn after(world: World, substeps: u32, steps: u32, open: Open) -> World {
     let config = SolverConfig::default().with(|c| c.substeps = substeps);
-    let mut simulation = Simulation::new(world, config, open()).expect("a simulation");
+    let mut simulation = Simulation::with(world, config, open()).expect("a simulation");
     (0..steps).for_each(|_| drop(simulation.step(DT).expect("a step")));
     simulation.world
 }
@@ -153,7 +153,7 @@ fn a_box_that_slides_on_honey_stops_where_its_closed_form_says() {
 fn damping_that_a_caller_changes_acts_from_the_next_step_on() {
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     world.add(cube().velocity(Vec3::X, Vec3::ZERO));
-    let mut simulation = Simulation::new(world, SolverConfig::default(), reference()).expect("a simulation");
+    let mut simulation = Simulation::with(world, SolverConfig::default(), reference()).expect("a simulation");
     let mut speed = 1.0;
     for rate in [0.0, 1.0, 0.0, 6.0] {
         simulation.world.bodies[0].linear_damping = rate;

@@ -2,8 +2,8 @@
 
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
-use drystone::scenes::CATALOGUE;
 use drystone::{Axis, Body, Bounds, Cpu, Joint, Linear, Reference, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::CATALOGUE;
 
 use crate::common::Open;
 
@@ -38,7 +38,7 @@ fn config(solver: JointSolver) -> SolverConfig {
 }
 
 fn simulation(world: World, solver: JointSolver) -> Simulation {
-    Simulation::new(world, config(solver), Box::new(Cpu::new())).expect("a good world")
+    Simulation::with(world, config(solver), Box::new(Cpu::new())).expect("a good world")
 }
 
 /// Kinetic and potential energy, less what the steps of symplectic Euler swing about: h/2 times the power of gravity.
@@ -86,7 +86,7 @@ fn a_chain_with_a_thousand_times_at_its_end_stays_together_and_gains_no_energy(o
     let begin = energy(&world, substep);
     let backend = open();
     let steps = if backend.name() == "cpu" { 1000 } else { 60 };
-    let mut simulation = Simulation::new(world, config(JointSolver::Auto), backend).expect("a good world");
+    let mut simulation = Simulation::with(world, config(JointSolver::Auto), backend).expect("a good world");
     let (mut gap, mut gained, mut lowest) = (0.0_f32, 0.0_f64, 0.0_f32);
     for step in 0..steps {
         simulation.step(DT).expect("a step");
@@ -115,7 +115,7 @@ fn a_chain_of_hinges_with_a_thousand_times_at_its_end_stays_together(open: Open)
     let world = with_joints(chain(100, 1000.0), |joint| joint.hinge(Vec3::Z));
     let backend = open();
     let steps = if backend.name() == "cpu" { 600 } else { 30 };
-    let mut simulation = Simulation::new(world, config(JointSolver::Auto), backend).expect("a good world");
+    let mut simulation = Simulation::with(world, config(JointSolver::Auto), backend).expect("a good world");
     let (mut gap, mut tilt) = (0.0_f32, 0.0_f32);
     for _ in 0..steps {
         simulation.step(DT).expect("a step");
@@ -214,7 +214,7 @@ fn machine() -> World {
 fn a_machine_of_all_kinds_moves_as_it_does_with_many_short_steps(open: Open) {
     let run = |substeps: u32, backend| {
         let config = config(JointSolver::Direct).with(|c| c.substeps = substeps);
-        let mut simulation = Simulation::new(machine(), config, backend).expect("a good world");
+        let mut simulation = Simulation::with(machine(), config, backend).expect("a good world");
         let mut gap = 0.0_f32;
         for _ in 0..30 {
             let stats = simulation.step(DT).expect("a step");
@@ -472,7 +472,7 @@ fn lanes_and_threads_have_the_bits_of_the_reference() {
         }
     }
     let run = |backend: Box<dyn drystone::Backend>| {
-        let mut simulation = Simulation::new(world.clone(), config(JointSolver::Auto), backend).expect("a good world");
+        let mut simulation = Simulation::with(world.clone(), config(JointSolver::Auto), backend).expect("a good world");
         (0..60).for_each(|_| assert!(simulation.step(DT).expect("a step").direct_joints > 0));
         simulation.world.bodies.iter().map(|b| (b.position, b.rotation)).collect::<Vec<_>>()
     };

@@ -76,7 +76,7 @@ fn cube(x: f32, y: f32) -> Body {
 }
 
 fn simulation(world: &World, config: &SolverConfig, backend: Box<dyn Backend>, listen: Listen) -> Simulation {
-    let mut simulation = Simulation::new(world.clone(), config.clone(), backend).expect("a good world");
+    let mut simulation = Simulation::with(world.clone(), config.clone(), backend).expect("a good world");
     simulation.listen(listen).expect("a good threshold");
     simulation
 }

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use drystone::backend::gpu::{Faults, GpuOptions, Loss};
-use drystone::stages::compare::Difference;
-use drystone::{Backend, Cpu, Error, Gpu, Reference, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{Backend, Cpu, Error, Gpu, Reference, Simulation, SolverConfig, StepStats};
+use drystone_conform::compare::Difference;
+use drystone_scenes::Scene;
 
 /// No submission is as long.
 const HOURS: Duration = Duration::from_secs(10_000);
@@ -48,7 +49,7 @@ fn open(options: GpuOptions) -> Box<dyn Backend> {
 /// the name of the backend in the end.
 fn run(scene: &Scene, config: &SolverConfig, options: GpuOptions, steps: u32) -> (Vec<(u32, String)>, &'static str) {
     let [mut ours, mut theirs] = [Box::new(Reference::<f32>::new()) as Box<dyn Backend>, open(options)]
-        .map(|backend| Simulation::new(scene.world.clone(), config.clone(), backend).expect("good settings"));
+        .map(|backend| Simulation::with(scene.world.clone(), config.clone(), backend).expect("good settings"));
     let mut faults = Vec::new();
     for step in 1..=steps {
         ours.step(scene.dt).expect("the reference runs");
@@ -119,7 +120,7 @@ fn a_long_plan_in_several_submissions_has_the_bits_of_one() {
     for substeps in [8, 40] {
         let config = SolverConfig::default().without_sleep().with(|c| c.substeps = substeps);
         run(&scene, &config, cut(), 20);
-        let mut simulation = Simulation::new(scene.world.clone(), config, open(cut())).expect("good settings");
+        let mut simulation = Simulation::with(scene.world.clone(), config, open(cut())).expect("good settings");
         let traffic: Vec<_> = (0..10).map(|_| simulation.step(scene.dt).expect("a step").traffic).collect();
         let most = traffic.iter().map(|t| t.submissions).max();
         measured!(
@@ -137,7 +138,7 @@ fn no_submission_of_a_plan_of_thousands_of_passes_takes_half_of_it() {
     let config = SolverConfig::default().without_sleep().with(|c| (c.substeps, c.fuse_colors_below) = (400, 0));
     let begun = |submission: Duration, steps: usize| {
         let gpu = open(GpuOptions { submission, ..GpuOptions::default() });
-        let mut simulation = Simulation::new(scene.world.clone(), config.clone(), gpu).expect("good settings");
+        let mut simulation = Simulation::with(scene.world.clone(), config.clone(), gpu).expect("good settings");
         // The first step compiles, and the second knows how fast the device is.
         (0..2).for_each(|_| drop(simulation.step(scene.dt).expect("a step")));
         (0..steps).map(|_| simulation.step(scene.dt).expect("a step")).collect::<Vec<_>>()
@@ -162,8 +163,7 @@ fn no_submission_of_a_plan_of_thousands_of_passes_takes_half_of_it() {
 
 fn a_problem_without_a_step_before_it_that_loses_its_device_is_refused_as_lost() {
     let scene = pile(27);
-    let mut simulation =
-        Simulation::new(scene.world.clone(), SolverConfig::default(), Box::new(Cpu::new())).expect("good settings");
+    let mut simulation = Simulation::new(scene.world.clone()).expect("good settings");
     let (problem, plan) = simulation.next_problem(scene.dt).expect("a step");
     let mut gpu = open(GpuOptions { faults: losses(&[(1, true)]), ..GpuOptions::default() });
     let mut changed = problem.clone();
@@ -179,7 +179,7 @@ fn a_pile_that_outgrows_a_buffer_is_refused_and_another_backend_goes_on_with_its
     // Room for what falls, and not for what lies.
     let options = GpuOptions { buffer_limit: 20_000, ..exact() };
     let [mut ours, mut theirs] = [Box::new(Reference::<f32>::new()) as Box<dyn Backend>, open(options)]
-        .map(|backend| Simulation::new(scene.world.clone(), config.clone(), backend).expect("good settings"));
+        .map(|backend| Simulation::with(scene.world.clone(), config.clone(), backend).expect("good settings"));
     let (mut refused, mut before) = (None, 0);
     for step in 1..=75 {
         ours.step(scene.dt).expect("the reference runs");
@@ -201,7 +201,7 @@ fn a_pile_that_outgrows_a_buffer_is_refused_and_another_backend_goes_on_with_its
 fn memory_that_is_not_there_is_refused_in_one_line() {
     let scene = pile(27);
     let gpu = open(GpuOptions { memory: 10_000, ..GpuOptions::default() });
-    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), gpu).expect("good settings");
+    let mut simulation = Simulation::with(scene.world.clone(), SolverConfig::default(), gpu).expect("good settings");
     let Err(Error::TooLarge(line)) = simulation.step(scene.dt) else { panic!("there was memory") };
     assert_one_line(&line, &[" B of memory for the ", "use --backend cpu"]);
     simulation.set_backend(Box::new(Cpu::new()));
@@ -219,7 +219,8 @@ fn a_mistake_in_a_shader_is_one_line() {
     for (shader, part) in mistakes {
         let faults = Faults { shader: Some(shader), ..Faults::default() };
         let gpu = open(GpuOptions { faults, ..GpuOptions::default() });
-        let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), gpu).expect("good settings");
+        let mut simulation =
+            Simulation::with(scene.world.clone(), SolverConfig::default(), gpu).expect("good settings");
         let error = simulation.step(scene.dt).expect_err("a wrong shader");
         assert!(matches!(error, Error::Adapter(_)), "{error:?}");
         assert_one_line(&error.to_string(), &[part]);

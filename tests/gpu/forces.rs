@@ -46,7 +46,7 @@ fn cube() -> Body {
 }
 
 fn simulation(world: World, open: Open) -> Simulation {
-    Simulation::new(world, SolverConfig::default(), open()).expect("a simulation")
+    Simulation::with(world, SolverConfig::default(), open()).expect("a simulation")
 }
 
 fn run(simulation: &mut Simulation, steps: u32) {
@@ -230,7 +230,7 @@ fn mixture() -> World {
 /// The mixture after 40 steps with hits and pushes, with substeps long and short.
 fn after_a_while(world: World, backend: Box<dyn drystone::Backend>, substeps: u32) -> World {
     let config = SolverConfig::default().with(|c| c.substeps = substeps);
-    let mut simulation = Simulation::new(world, config, backend).expect("a simulation");
+    let mut simulation = Simulation::with(world, config, backend).expect("a simulation");
     for step in 0..40 {
         let body = &mut simulation.world.bodies[4];
         if step % 7 == 3 {
@@ -450,7 +450,7 @@ fn loads_that_are_no_numbers_are_refused_by_name() {
     for (line, change) in changes {
         let mut world = sleepers(9.81);
         change(&mut world);
-        let error = Simulation::new(world, SolverConfig::default(), reference()).err().expect("a refusal").to_string();
+        let error = Simulation::with(world, SolverConfig::default(), reference()).err().expect("a refusal").to_string();
         assert!(error.contains(line) && !error.contains('\n'), "{error}");
     }
 }

@@ -12,16 +12,14 @@ use crate::common::tolerance;
 use drystone::backend::gpu::GpuOptions;
 use drystone::config::Method;
 use drystone::glam::Vec3;
-use drystone::scenes::Spawners;
 use drystone::stages::backend::{CheckedStep, crossover};
-use drystone::stages::compare::{Difference, compare};
 use drystone::stages::plan::Kernel;
 use drystone::stages::problem::ContactSummary;
 use drystone::stages::problem::carry::Carry;
 use drystone::stats::median;
-use drystone::{
-    Backend, Body, Cpu, Error, Event, Gpu, Joint, Scene, Shape, Simulation, SolverConfig, StepPlan, StepProblem,
-};
+use drystone::{Backend, Body, Cpu, Error, Event, Gpu, Joint, Shape, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone_conform::compare::{Difference, compare};
+use drystone_scenes::{Scene, Spawners};
 use settings::set;
 
 tests! {
@@ -91,7 +89,7 @@ fn work_cut_as_for_hardware_has_the_bits_of_the_reference() {
     config.fuse_colors_below = 0;
     let scene = pile();
     let after = |backend: Box<dyn Backend>| {
-        let mut simulation = Simulation::new(scene.world.clone(), config.clone(), backend).expect("good settings");
+        let mut simulation = Simulation::with(scene.world.clone(), config.clone(), backend).expect("good settings");
         (0..LANDED).for_each(|_| drop(simulation.step(scene.dt).expect("a step")));
         simulation.world
     };
@@ -163,7 +161,7 @@ fn friction_per_manifold_without_friction_has_the_bits_of_the_reference() {
 fn a_mixture_has_work_for_every_kernel() {
     let scene = mixture();
     let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
+        Simulation::with(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
     for _ in 0..LANDED {
         simulation.step(scene.dt).expect("the reference runs");
     }
@@ -180,7 +178,7 @@ fn a_mixture_has_work_for_every_kernel() {
 fn apart_during_a_fall(mut step: impl FnMut(&StepProblem, &StepPlan) -> StepProblem) -> Vec<f64> {
     let scene = pile();
     let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
+        Simulation::with(scene.world, SolverConfig::default().without_sleep(), reference()).expect("good settings");
     let mut apart = Vec::new();
     for now in 1..=100 {
         let (problem, plan) = simulation.next_problem(scene.dt).expect("a step");
@@ -265,7 +263,7 @@ fn a_device_tells_how_long_it_was_at_what() {
     let (gpu, bandwidth) = gpu::timed(gpu::own_plain());
     let scene = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
     let mut simulation =
-        Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(gpu)).expect("good settings");
+        Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(gpu)).expect("good settings");
     for step in 1..=60 {
         let start = std::time::Instant::now();
         let stats = simulation.step(scene.dt).expect("a step");
@@ -310,7 +308,7 @@ fn told_by_a_board(backend: Box<dyn Backend>) -> Vec<(u32, Event)> {
     const STEPS: u32 = 12 * 6 + 150;
     let scene = Scene::find("galton", &["n=6".into(), "rows=2".into(), "every=12".into()]).expect("a scene");
     let mut spawners = Spawners::new(&scene);
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), backend).expect("good settings");
+    let mut simulation = Simulation::with(scene.world, SolverConfig::default(), backend).expect("good settings");
     let mut told = Vec::new();
     for step in 0..STEPS {
         spawners.before_step(&mut simulation.world, scene.dt);
@@ -336,10 +334,10 @@ fn plain_wgsl_lets_every_ball_pass_the_sensors() {
 fn kernels_that_are_timed_have_the_bits_of_the_reference() {
     let (gpu, _) = gpu::timed(gpu::own_exact());
     let scene = mixture();
-    let mut ours = Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), reference())
+    let mut ours = Simulation::with(scene.world.clone(), SolverConfig::default().without_sleep(), reference())
         .expect("good settings");
     let mut theirs =
-        Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(gpu)).expect("good settings");
+        Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(gpu)).expect("good settings");
     for _ in 0..LANDED {
         ours.step(scene.dt).expect("the reference runs");
         theirs.step(scene.dt).expect("the GPU runs");
@@ -353,7 +351,7 @@ fn pipelines_stay_from_one_run_to_the_next() {
     let run = || {
         let gpu = Gpu::open(options()).expect("an adapter");
         let Scene { world, dt, .. } = pile();
-        let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(gpu)).expect("a pile");
+        let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(gpu)).expect("a pile");
         simulation.step(dt).expect("a step");
         simulation.hash()
     };
@@ -376,7 +374,7 @@ fn steered_wgsl_runs_many_passes_to_their_end() {
     let hash = |backend: Box<dyn Backend>| {
         let Scene { world, dt, .. } = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
         let config = SolverConfig::default().with(|c| c.substeps = 160);
-        let mut simulation = Simulation::new(world, config, backend).expect("a pile");
+        let mut simulation = Simulation::with(world, config, backend).expect("a pile");
         for _ in 0..40 {
             simulation.step(dt).expect("a step");
         }

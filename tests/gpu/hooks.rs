@@ -45,7 +45,7 @@ fn floor() -> Body {
 }
 
 fn simulation(world: World, open: Open) -> Simulation {
-    Simulation::new(world, SolverConfig::default(), open()).expect("a good world")
+    Simulation::with(world, SolverConfig::default(), open()).expect("a good world")
 }
 
 fn steps(simulation: &mut Simulation, count: u32) {

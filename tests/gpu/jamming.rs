@@ -32,7 +32,7 @@ fn rod(mu: f32, degrees: f32, way: f32) -> World {
 
 fn simulate(world: World, substeps: u32, backend: Box<dyn Backend>) -> Simulation {
     let config = SolverConfig::default().with(|c| c.substeps = substeps).without_sleep();
-    Simulation::new(world, config, backend).expect("a good world")
+    Simulation::with(world, config, backend).expect("a good world")
 }
 
 /// The largest share of its energy that a rod gains in a step of 3 s, and the share that is left.
@@ -92,7 +92,7 @@ fn a_plane_is_touched_without_a_margin() {
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.6, 0.0));
     let config = SolverConfig::default().with(|c| c.speculative_margin = 0.0);
-    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("a good world");
+    let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world");
     (0..60).for_each(|_| drop(simulation.step(DT).expect("a step")));
     let height = simulation.world.bodies[1].position.y;
     assert!((height - 0.5).abs() < 1e-3, "{height} m");

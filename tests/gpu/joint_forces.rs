@@ -22,7 +22,7 @@ const DT: f32 = 1.0 / 60.0;
 const G: f32 = 9.81;
 
 fn simulation(world: World, config: SolverConfig, open: Open) -> Simulation {
-    Simulation::new(world, config, open()).expect("a good world")
+    Simulation::with(world, config, open()).expect("a good world")
 }
 
 fn awake() -> SolverConfig {

@@ -37,7 +37,7 @@ tests! {
 }
 
 fn simulate(world: World, open: Open) -> Simulation {
-    Simulation::new(world, SolverConfig::default().without_sleep(), open()).unwrap()
+    Simulation::with(world, SolverConfig::default().without_sleep(), open()).unwrap()
 }
 
 fn steps(simulation: &mut Simulation, seconds: f32, mut each: impl FnMut(f32, &World)) {

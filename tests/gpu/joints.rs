@@ -18,7 +18,7 @@ tests! {
 }
 
 fn simulate(world: World, config: SolverConfig, open: Open) -> Simulation {
-    Simulation::new(world, config, open()).unwrap()
+    Simulation::with(world, config, open()).unwrap()
 }
 
 /// Period of a rod of length 1 m hung by its end, from the times at which it passes the vertical [s].

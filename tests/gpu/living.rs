@@ -62,7 +62,7 @@ fn towers(count: usize) -> (World, Vec<Vec<BodyHandle>>) {
 }
 
 fn simulation(world: &World, config: &SolverConfig, open: Open) -> Simulation {
-    Simulation::new(world.clone(), config.clone(), open()).expect("a good world")
+    Simulation::with(world.clone(), config.clone(), open()).expect("a good world")
 }
 
 /// What lies on a body falls when the body goes, and what the body does not touch does not see it, to the last bit.

@@ -128,7 +128,7 @@ impl Run {
         for body in world.bodies.handles() {
             model.bodies.insert(body, kept(&world.bodies[body.index()], world.bodies.worlds()[body.index()] as usize));
         }
-        let simulation = Simulation::new(world, config(), backend).expect("a good world");
+        let simulation = Simulation::with(world, config(), backend).expect("a good world");
         Self { random: Random::new(seed), simulation, model, scenery, calls: 0, hashes: Vec::new(), reload: None }
     }
 

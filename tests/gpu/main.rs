@@ -4,7 +4,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-#[cfg(feature = "serde")]
 #[path = "../laws/mod.rs"]
 #[allow(dead_code)]
 mod laws;
@@ -16,12 +15,10 @@ mod course;
 mod damping;
 mod direct_joints;
 mod events;
-#[cfg(feature = "serde")]
 mod exact_laws;
 mod faults;
 mod forces;
 mod golden_gpu;
-#[cfg(feature = "serde")]
 mod gpu;
 mod hooks;
 mod jamming;
@@ -37,7 +34,6 @@ mod problems;
 mod resident;
 mod saved_problem;
 mod solver;
-#[cfg(feature = "serde")]
 mod spin;
 mod spring_dampers;
 mod teleports;
@@ -52,12 +48,10 @@ fn main() -> std::process::ExitCode {
         damping::tests(),
         direct_joints::tests(),
         events::tests(),
-        #[cfg(feature = "serde")]
         exact_laws::tests(),
         faults::tests(),
         forces::tests(),
         golden_gpu::tests(),
-        #[cfg(feature = "serde")]
         gpu::tests(),
         hooks::tests(),
         jamming::tests(),
@@ -73,7 +67,6 @@ fn main() -> std::process::ExitCode {
         resident::tests(),
         saved_problem::tests(),
         solver::tests(),
-        #[cfg(feature = "serde")]
         spin::tests(),
         spring_dampers::tests(),
         teleports::tests(),

@@ -25,7 +25,7 @@ tests! {
 }
 
 fn simulate(world: World, config: SolverConfig, open: Open) -> Simulation {
-    Simulation::new(world, config, open()).expect("good settings")
+    Simulation::with(world, config, open()).expect("good settings")
 }
 
 /// A pendulum for each mass, side by side: a ball of radius 0.1 m at the end of 1 m, out by `angle`.
@@ -165,7 +165,7 @@ fn cubes_of_all_masses_slide_as_far(open: Open) {
 
 fn lanes_have_the_bits_of_the_reference_at_all_masses() {
     let run = |backend: Box<dyn Backend>| {
-        let mut simulation = Simulation::new(pendulums(0.7), SolverConfig::default(), backend).expect("good settings");
+        let mut simulation = Simulation::with(pendulums(0.7), SolverConfig::default(), backend).expect("good settings");
         for _ in 0..60 {
             simulation.step(1.0 / 60.0).expect("a step");
         }

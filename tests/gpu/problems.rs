@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use crate::common::contacts::{curve, sweeps_to};
 use crate::common::gpu;
 use drystone::config::Method;
-use drystone::contacts::Operator;
-use drystone::residuals::Measure;
-use drystone::solver::newton::{Bodies, newton};
-use drystone::solver::{Order, Solver};
 use drystone::stats::median;
-use drystone::{Backend, ContactProblem, Cpu};
+use drystone::{Backend, Cpu};
+use drystone_problems::ContactProblem;
+use drystone_problems::contacts::Operator;
+use drystone_problems::residuals::Measure;
+use drystone_problems::solver::newton::{Bodies, newton};
+use drystone_problems::solver::{Order, Solver};
 
 /// Errors to which sweeps are counted.
 const ERRORS: [f64; 3] = [1e-1, 1e-2, 1e-3];

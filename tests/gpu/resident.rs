@@ -6,11 +6,12 @@ use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::backend::shader::WrittenContact;
-use drystone::stages::compare::Difference;
 use drystone::stages::problem::carry::{Carry, Written};
 use drystone::stages::problem::{ContactRow, ConvergenceRow, MomentumRow};
 use drystone::stats::Traffic;
-use drystone::{Backend, Body, Reference, Result, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::{Backend, Body, Reference, Result, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone_conform::compare::Difference;
+use drystone_scenes::Scene;
 
 tests! {
     exact_gpu {
@@ -35,7 +36,7 @@ tests! {
 }
 
 fn simulation(scene: &Scene, config: &SolverConfig, backend: Box<dyn Backend>) -> Simulation {
-    Simulation::new(scene.world.clone(), config.clone(), backend).expect("good settings")
+    Simulation::with(scene.world.clone(), config.clone(), backend).expect("good settings")
 }
 
 fn pile(n: usize) -> Scene {
@@ -336,7 +337,7 @@ fn a_falling_pile_sends_what_was_computed_and_the_order() {
 fn same_on_a_device(world: World, config: &SolverConfig, steps: u32, change: impl Fn(u32, &mut World)) {
     let backends: [Box<dyn Backend>; 2] = [Box::new(Reference::<f32>::new()), Box::new(gpu::exact())];
     let mut both =
-        backends.map(|backend| Simulation::new(world.clone(), config.clone(), backend).expect("good settings"));
+        backends.map(|backend| Simulation::with(world.clone(), config.clone(), backend).expect("good settings"));
     for step in 0..steps {
         for simulation in &mut both {
             change(step, &mut simulation.world);

@@ -3,10 +3,11 @@
 use crate::common::Open;
 use crate::common::contacts::{curve, sweeps_to};
 use drystone::config::Method;
-use drystone::contacts::{ContactProblem, Operator};
 use drystone::glam::{DVec3, Vec3};
-use drystone::solver::{Order, solution};
-use drystone::{Body, Cpu, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Cpu, Shape, Simulation, SolverConfig, World};
+use drystone_problems::contacts::{ContactProblem, Operator};
+use drystone_problems::solver::{Order, solution};
+use drystone_scenes::Scene;
 
 tests! {
     every_backend {
@@ -23,7 +24,7 @@ tests! {
 fn simulation(scene: &str, parameters: &[&str], steps: u32) -> Simulation {
     let parameters: Vec<String> = parameters.iter().map(|p| (*p).into()).collect();
     let scene = Scene::find(scene, &parameters).expect("a scene of the catalogue");
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))
+    let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))
         .expect("it is sound");
     for _ in 0..steps {
         simulation.step(1.0 / 60.0).expect("a step");
@@ -35,7 +36,8 @@ fn simulation(scene: &str, parameters: &[&str], steps: u32) -> Simulation {
 fn problems() -> Vec<ContactProblem> {
     [("pile", &["n=60"][..], 100), ("tower", &["n=6"], 30), ("wall", &["rows=5", "columns=4"], 60), ("drop", &[], 70)]
         .map(|(scene, parameters, steps)| {
-            simulation(scene, parameters, steps).step_with_contacts(scene, 1.0 / 60.0).expect("no joints").0
+            let mut simulation = simulation(scene, parameters, steps);
+            drystone_problems::step_with_contacts(&mut simulation, scene, 1.0 / 60.0).expect("no joints").0
         })
         .into()
 }
@@ -86,8 +88,8 @@ fn a_problem_says_what_the_bodies_are_about_to_do() {
     world.add(falling.velocity(Vec3::NEG_Y, Vec3::ZERO));
     world.add(Body::dynamic().shape(Shape::ball(0.5)).position(50.0, 50.0, 0.0));
     let config = SolverConfig::default().without_sleep().with(|c| c.substeps = 4);
-    let mut simulation = Simulation::new(world, config, Box::new(Cpu::new())).expect("it is sound");
-    let (problem, _) = simulation.step_with_contacts("plate", 0.1).expect("no joints");
+    let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("it is sound");
+    let (problem, _) = drystone_problems::step_with_contacts(&mut simulation, "plate", 0.1).expect("no joints");
 
     assert_eq!((problem.bodies.len(), problem.contacts.len()), (1, 4), "the ball touches nothing");
     let box_ = &problem.bodies[0];
@@ -109,7 +111,7 @@ fn saving_a_step_changes_nothing() {
         let mut simulation = simulation("pile", &["n=60"], 60);
         for _ in 0..30 {
             if save {
-                simulation.step_with_contacts("pile", 1.0 / 60.0).expect("no joints");
+                drystone_problems::step_with_contacts(&mut simulation, "pile", 1.0 / 60.0).expect("no joints");
             } else {
                 simulation.step(1.0 / 60.0).expect("a step");
             }

@@ -3,9 +3,10 @@
 use crate::common::contacts::{bearing, curve, sweeps_to, tower};
 use crate::common::{Open, gpu};
 use drystone::config::Method;
-use drystone::residuals::{Measure, Residuals};
-use drystone::solver::{Order, Sequence, Solver, solution};
-use drystone::{Backend, ContactProblem, Cpu, Reference};
+use drystone::{Backend, Cpu, Reference};
+use drystone_problems::ContactProblem;
+use drystone_problems::residuals::{Measure, Residuals};
+use drystone_problems::solver::{Order, Sequence, Solver, solution};
 use glam::DVec3;
 
 tests! {

@@ -2,8 +2,8 @@
 
 use crate::common::{Open, gpu};
 use drystone::preset::Preset;
-use drystone::scenes::SceneFile;
 use drystone::{Body, Cpu, MassProperties, Reference, Shape, Simulation, World};
+use drystone_scenes::SceneFile;
 use glam::{DVec3, Quat, Vec3};
 
 const SPEEDS: [f32; 10] = [1.0, 30.0, 60.0, 120.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6];
@@ -99,7 +99,7 @@ fn drift(world: World, dt: f32, steps: u32) -> Drift {
 
 fn simulate(world: World, open: Open) -> Simulation {
     let config = Preset::Fast.config().with(|c| c.sleep_after = 0.0);
-    Simulation::new(world, config, open()).expect("good settings")
+    Simulation::with(world, config, open()).expect("good settings")
 }
 
 /// What rounding may do in 2400 substeps: 1e-4. A spin is stored in world axes to 6e-8 of its length, and so it turns within the

@@ -26,7 +26,7 @@ tests! {
 const DT: f32 = 1.0 / 240.0;
 
 fn simulation(world: World, open: Open) -> Simulation {
-    Simulation::new(world, SolverConfig::default().without_sleep(), open()).expect("a good world")
+    Simulation::with(world, SolverConfig::default().without_sleep(), open()).expect("a good world")
 }
 
 fn weightless() -> World {
@@ -196,7 +196,7 @@ fn bodies_of_a_joint_that_is_off_collide_and_wake() {
     world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     let [low, high] = [0.1, 0.25].map(|y| world.add(cube(1.0).position(0.0, y, 0.0)));
     world.join(Joint::new(high, Vec3::ZERO, low, Vec3::Y * 0.15).fixed());
-    let mut simulation = Simulation::new(world, SolverConfig::default(), reference()).expect("a good world");
+    let mut simulation = Simulation::with(world, SolverConfig::default(), reference()).expect("a good world");
     let steps = |simulation: &mut Simulation| (0..480).for_each(|_| drop(simulation.step(DT).expect("a step")));
     steps(&mut simulation);
     assert!(simulation.is_asleep(high) && (simulation.world.bodies[high].position.y - 0.25).abs() < 1e-3);

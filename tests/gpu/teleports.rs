@@ -41,7 +41,7 @@ fn towers(heights: &[usize]) -> World {
 
 /// The same after two seconds of rest.
 fn settled(world: World, config: SolverConfig) -> Simulation {
-    let mut simulation = Simulation::new(world, config, reference()).expect("a simulation");
+    let mut simulation = Simulation::with(world, config, reference()).expect("a simulation");
     run(&mut simulation, 120);
     simulation
 }
@@ -215,7 +215,7 @@ fn a_box_that_is_put_away_and_back_within_a_step_keeps_its_bits() {
 
 fn same_as_the_reference(backend: fn() -> Box<dyn drystone::Backend>) {
     let [ours, theirs] = [reference(), backend()].map(|backend| {
-        let mut simulation = Simulation::new(towers(&[6, 4, 1]), SolverConfig::default().without_sleep(), backend)
+        let mut simulation = Simulation::with(towers(&[6, 4, 1]), SolverConfig::default().without_sleep(), backend)
             .expect("a simulation");
         for step in 0..60 {
             let body = 1 + (7 * step) % 11;

@@ -7,7 +7,8 @@ use drystone::backend::Running;
 use drystone::backend::gpu::{Faults, GpuOptions, Loss};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::problem::carry::Carry;
-use drystone::{Backend, Gpu, Reference, Result, Scene, Simulation, SolverConfig};
+use drystone::{Backend, Gpu, Reference, Result, Simulation, SolverConfig};
+use drystone_scenes::Scene;
 
 tests! {
     exact_gpu {
@@ -23,7 +24,7 @@ tests! {
 fn pile(backend: Box<dyn Backend>) -> (Simulation, f32) {
     let scene = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
     let config = SolverConfig::default().without_sleep();
-    (Simulation::new(scene.world, config, backend).expect("good settings"), scene.dt)
+    (Simulation::with(scene.world, config, backend).expect("good settings"), scene.dt)
 }
 
 fn exact(losses: Vec<Loss>) -> Box<dyn Backend> {

@@ -6,7 +6,8 @@ use std::str::FromStr;
 
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::random::SplitMix64;
-use drystone::{Axis, Body, BodyKind, Error, Groups, Joint, Linear, Scene, Shape, World, named};
+use drystone::{Axis, Body, BodyKind, Error, Groups, Joint, Linear, Shape, World, named};
+use drystone_scenes::Scene;
 
 /// The things that the worlds of a family have beside bodies of 0.1 to 1 m and 100 to 10,000 kg/m³ on joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

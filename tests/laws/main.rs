@@ -15,8 +15,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use drystone::preset::Preset;
-use drystone::scenes::SceneFile;
-use drystone::{Cpu, Error, Scene, SolverConfig};
+use drystone::{Cpu, Error, SolverConfig};
+use drystone_scenes::{Scene, SceneFile};
 
 #[path = "mod.rs"]
 mod laws;
@@ -121,7 +121,7 @@ impl Options {
     /// A world by its name, or of a scene file.
     fn case(&self, name: &str) -> Result<Case, String> {
         let (scene, rate) = if name.ends_with(".json") {
-            let scene = drystone::scenes::load(name.as_ref()).map_err(|e| e.to_string())?;
+            let scene = drystone_scenes::load(name.as_ref()).map_err(|e| e.to_string())?;
             let rate = (1.0 / scene.dt).round() as u32;
             (scene, rate)
         } else {

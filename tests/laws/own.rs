@@ -3,8 +3,8 @@
 use std::f32::consts::PI;
 
 use drystone::glam::{DVec3, Quat, Vec3};
-use drystone::scenes::SceneFile;
-use drystone::{Axis, Body, Cpu, Joint, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Axis, Body, Joint, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::{Scene, SceneFile};
 
 use crate::laws::draw::{Drawn, Family, Kind};
 use crate::laws::measures::{Gap, Mechanics, Springs, is_alone};
@@ -64,7 +64,7 @@ fn a_joule_too_much_is_seen() {
 fn kicked(kick: impl Fn(&mut World)) -> (Mechanics, Mechanics) {
     let world = bar_and_ball();
     let before = Mechanics::of(&world);
-    let mut simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a world");
+    let mut simulation = Simulation::new(world).expect("a world");
     simulation.step(1.0 / 60.0).expect("a step");
     kick(&mut simulation.world);
     (before, Mechanics::of(&simulation.world))

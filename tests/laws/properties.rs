@@ -7,8 +7,8 @@
 use std::fmt::Write;
 
 use drystone::preset::Preset;
-use drystone::scenes::SceneFile;
 use drystone::{Backend, Cpu, Reference, SolverConfig};
+use drystone_scenes::SceneFile;
 use rayon::prelude::*;
 
 use crate::laws::draw::{Drawn, Family, Kind};

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use drystone::glam::DVec3;
-use drystone::{Backend, BodyKind, Cpu, Listen, Scene, Simulation, SolverConfig, World};
+use drystone::{Backend, BodyKind, Cpu, Listen, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 use super::measures::{Gap, Mechanics, Springs, is_alone, size};
 
@@ -323,7 +324,7 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
         config = config.without_sleep();
     }
     let limit = f64::from(config.push_limit);
-    let mut simulation = match Simulation::new(case.scene.world.clone(), config, backend) {
+    let mut simulation = match Simulation::with(case.scene.world.clone(), config, backend) {
         Ok(simulation) => simulation,
         Err(e) => return Verdict { lost: Some(e.to_string()), ..verdict },
     };

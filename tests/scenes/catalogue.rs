@@ -2,8 +2,8 @@
 
 use drystone::glam::Vec3;
 use drystone::metrics::{in_place, rms_speed};
-use drystone::scenes::{CATALOGUE, Spawners};
-use drystone::{Backend, Body, BodyKind, Bounds, Cpu, Event, Reference, Scene, Simulation, SolverConfig};
+use drystone::{Backend, Body, BodyKind, Bounds, Cpu, Event, Reference, Simulation, SolverConfig};
+use drystone_scenes::{CATALOGUE, Scene, Spawners};
 
 /// A scene of the catalogue, and its simulation after some steps.
 fn run(name: &str, parameters: &[&str], steps: u32) -> (Scene, Simulation) {
@@ -11,7 +11,7 @@ fn run(name: &str, parameters: &[&str], steps: u32) -> (Scene, Simulation) {
     let scene = Scene::find(name, &parameters).expect(name);
     let reference = Box::new(Reference::<f32>::new());
     let mut simulation =
-        Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), reference).expect(name);
+        Simulation::with(scene.world.clone(), SolverConfig::default().without_sleep(), reference).expect(name);
     step(&mut simulation, steps);
     (scene, simulation)
 }
@@ -70,7 +70,7 @@ fn a_wall_rests() {
     let scene = Scene::find("wall", &[]).expect("the scene");
     let lanes = Box::new(Cpu::new());
     let mut simulation =
-        Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), lanes).expect("a simulation");
+        Simulation::with(scene.world.clone(), SolverConfig::default().without_sleep(), lanes).expect("a simulation");
     step(&mut simulation, 300);
     let speed = rms_speed(&simulation.world);
     assert!(speed < 1e-3 && fallen(&scene, &simulation) == 0, "{speed:e} m/s");
@@ -223,7 +223,7 @@ fn flow_on(
     let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
     let scene = Scene::find(name, &parameters).expect(name);
     let mut spawners = Spawners::new(&scene);
-    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), backend).expect(name);
+    let mut simulation = Simulation::with(scene.world.clone(), SolverConfig::default(), backend).expect(name);
     for step in 0..steps {
         spawners.before_step(&mut simulation.world, scene.dt);
         simulation.step(scene.dt).expect("a step");

@@ -2,7 +2,8 @@
 
 use drystone::load::Load;
 use drystone::preset::Preset;
-use drystone::{BodyKind, Cpu, Scene, Simulation, metrics};
+use drystone::{BodyKind, Cpu, Simulation, metrics};
+use drystone_scenes::Scene;
 
 /// A tower whose cubes fall at 1 mm/s, so that none begins with the impulses that it rests with.
 fn falling(parameters: &[String]) -> Scene {
@@ -13,7 +14,7 @@ fn falling(parameters: &[String]) -> Scene {
 
 /// Deepest overlap at any time and at the end [m], and bodies that are not in place, after `seconds` of a tower.
 fn tower(preset: Preset, seconds: u32, scene: &Scene) -> (f64, f64, usize) {
-    let mut simulation = Simulation::new(scene.world.clone(), preset.config().without_sleep(), Box::new(Cpu::new()))
+    let mut simulation = Simulation::with(scene.world.clone(), preset.config().without_sleep(), Box::new(Cpu::new()))
         .expect("a simulation");
     let (mut deepest, mut last) = (0.0_f64, 0.0);
     for step in 1..=60 * seconds {
@@ -76,7 +77,7 @@ fn with_at_most(most: f64, parameters: &[String]) -> (u32, f64, f64) {
     let load = Load::heaviest(&scene.world, &config).expect("a load");
     config.substeps = load.substeps(most, scene.dt, &config).expect("substeps");
     let substeps = config.substeps;
-    let mut simulation = Simulation::new(scene.world.clone(), config, Box::new(Cpu::new())).expect("a simulation");
+    let mut simulation = Simulation::with(scene.world.clone(), config, Box::new(Cpu::new())).expect("a simulation");
     let step = |_| {
         simulation.step(scene.dt).expect("a step");
         simulation.penetration().max

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use drystone::scenes::{SceneFile, load, schema};
-use drystone::{BodyKind, CombineRule, Error, Material, Scene};
+use drystone::{BodyKind, CombineRule, Error, Material};
+use drystone_scenes::{Scene, SceneFile, load, schema};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 

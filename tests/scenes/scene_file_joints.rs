@@ -1,8 +1,8 @@
 //! Joints of scene files: what loads, and how each bad one is refused.
 
 use drystone::glam::Vec3;
-use drystone::scenes::SceneFile;
-use drystone::{Axis, Error, Joint, Linear, Scene};
+use drystone::{Axis, Error, Joint, Linear};
+use drystone_scenes::{Scene, SceneFile};
 use serde_json::{Value, json};
 
 /// The scene with this joint and four bodies: a fixed `wall`, two dynamic balls `a` and `twin`, a kinematic `twin`.

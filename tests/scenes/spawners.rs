@@ -1,8 +1,8 @@
 //! Scenes in which bodies come and go, and scene files written from worlds in motion.
 
 use drystone::glam::Vec3;
-use drystone::scenes::{Leaves, SceneFile, Spawner, Spawners};
-use drystone::{Body, Cpu, Error, Groups, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Error, Groups, Reference, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::{Leaves, Scene, SceneFile, Spawner, Spawners};
 
 fn read(text: &str) -> Result<Scene, Error> {
     SceneFile::parse(text)?.into_scene("unnamed")
@@ -22,7 +22,7 @@ const RAIN: &str = r#"{"version": 1, "bodies": [
 fn run(scene: &Scene, steps: u32, mut tell: impl FnMut(&World, &Spawners)) -> (Simulation, Spawners) {
     let mut spawners = Spawners::new(scene);
     let backend = Box::new(Reference::<f32>::new());
-    let mut simulation = Simulation::new(scene.world.clone(), SolverConfig::default(), backend).expect("a good scene");
+    let mut simulation = Simulation::with(scene.world.clone(), SolverConfig::default(), backend).expect("a good scene");
     for _ in 0..steps {
         spawners.before_step(&mut simulation.world, scene.dt);
         tell(&simulation.world, &spawners);
@@ -91,8 +91,7 @@ fn spawners_go_the_same_way_on_any_backend_and_in_worlds_beside_each_other() {
     let scene = read(RAIN).expect("a good scene");
     let (alone, _) = run(&scene, 50, |_, _| {});
     let mut spawners = Spawners::new(&scene);
-    let mut lanes =
-        Simulation::new(scene.world.clone(), SolverConfig::default(), Box::new(Cpu::new())).expect("a world");
+    let mut lanes = Simulation::new(scene.world.clone()).expect("a world");
     for _ in 0..50 {
         spawners.before_step(&mut lanes.world, scene.dt);
         lanes.step(scene.dt).expect("a step");

@@ -202,13 +202,14 @@ fn on_scale(x: f32) -> Rgba {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::{Reference, Scene, Simulation, SolverConfig};
+    use drystone::{Reference, Simulation, SolverConfig};
+    use drystone_scenes::Scene;
 
     fn settled(name: &str, parameters: &[String]) -> Simulation {
         let scene = Scene::find(name, parameters).expect("a scene");
         let reference = Box::new(Reference::<f32>::new());
         let config = SolverConfig::default().with(|c| c.sleep_after = 0.1);
-        let mut simulation = Simulation::new(scene.world, config, reference).expect("a simulation");
+        let mut simulation = Simulation::with(scene.world, config, reference).expect("a simulation");
         for _ in 0..20 {
             simulation.step(scene.dt).expect("a step");
         }

@@ -10,8 +10,9 @@ use crate::labyrinth;
 use crate::overlay::ropes;
 use crate::poses::poses;
 use crate::renderer::Shot;
-use drystone::{Result, Scene, Simulation, World};
+use drystone::{Result, Simulation, World};
 use drystone_maze::Map;
+use drystone_scenes::Scene;
 
 #[derive(Clone, Debug)]
 pub struct Moment {

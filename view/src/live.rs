@@ -12,11 +12,10 @@ use crate::poses::poses;
 use crate::show::Pointer;
 use drystone::backend::{BackendChoice, choose};
 use drystone::queries::Filter;
-use drystone::scenes::Spawners;
 use drystone::{
-    Backend, Body, BodyKind, Cpu, JointHandle, Replay, Result, Scene, Shape, Simulation, Snapshot, SolverConfig,
-    StepStats,
+    Backend, Body, BodyKind, Cpu, JointHandle, Result, Shape, Simulation, Snapshot, SolverConfig, StepStats,
 };
+use drystone_scenes::{Replay, Scene, Spawners};
 
 /// Rate at which a pulled body approaches the pointer (1/s). It is soft for joints of any stiffness.
 const PULL: f32 = 10.0;
@@ -111,7 +110,7 @@ impl Live {
     /// Those of [`choose`]; or settings are invalid, or the scene does not fit into memory.
     pub fn new(scene: Scene, config: SolverConfig, choice: BackendChoice, exact: bool, color: ColorBy) -> Result<Self> {
         let (backend, _) = choose(choice, scene.world.dynamic_count(), exact)?;
-        let simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        let simulation = Simulation::with(scene.world.clone(), config, backend)?;
         Ok(Self { choice, exact, ..Self::of(scene, simulation, color) })
     }
 
@@ -120,7 +119,7 @@ impl Live {
     /// # Errors
     /// Settings are invalid, or the scene does not fit into memory.
     pub fn with(scene: Scene, config: SolverConfig, backend: Box<dyn Backend>, color: ColorBy) -> Result<Self> {
-        let simulation = Simulation::new(scene.world.clone(), config, backend)?;
+        let simulation = Simulation::with(scene.world.clone(), config, backend)?;
         Ok(Self::of(scene, simulation, color))
     }
 
@@ -213,7 +212,7 @@ impl Live {
     fn restart(&mut self) -> Result<()> {
         let config = self.simulation.config().clone();
         let backend = self.simulation.set_backend(Box::new(Cpu::new()));
-        self.simulation = Simulation::new(self.scene.world.clone(), config, backend)?;
+        self.simulation = Simulation::with(self.scene.world.clone(), config, backend)?;
         self.spawners = Spawners::new(&self.scene);
         (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
         self.look_anew();
@@ -385,7 +384,8 @@ mod tests {
 
     use super::*;
     use crate::show::{Key, Pointer, Show};
-    use drystone::{Recorder, RecordingIntervals, Reference};
+    use drystone::Reference;
+    use drystone_scenes::{Recorder, RecordingIntervals};
 
     fn live(name: &str) -> Live {
         let scene = Scene::find(name, &[]).expect("a scene");
@@ -516,7 +516,7 @@ mod tests {
     fn a_recording_runs_forth_and_back_and_stops_at_its_end() {
         let scene = Scene::find("drum", &[]).expect("a scene");
         let config = SolverConfig::default();
-        let mut simulation = Simulation::new(scene.world, config, Box::new(Reference::<f32>::new())).expect("a scene");
+        let mut simulation = Simulation::with(scene.world, config, Box::new(Reference::<f32>::new())).expect("a scene");
         let mut recorder =
             Recorder::new(Vec::new(), "drum", &mut simulation, RecordingIntervals::default()).expect("memory");
         let hashes: Vec<u64> = (0..90)

@@ -187,7 +187,7 @@ fn corners((vertices, triangles): &Triangles) -> Vec<Vertex> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::Scene;
+    use drystone_scenes::Scene;
 
     #[test]
     fn equal_geometry_is_one_draw_and_every_collider_is_an_instance() {
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn every_scene_of_the_catalogue_has_meshes_with_unit_normals() {
-        for entry in drystone::scenes::CATALOGUE {
+        for entry in drystone_scenes::CATALOGUE {
             let world = entry.build(&[]).expect(entry.name).world;
             let meshes = Meshes::new(&world);
             let colliders: usize = world.bodies.iter().map(|b| b.colliders.len()).sum();

@@ -94,13 +94,14 @@ pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<Li
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drystone::{Reference, Scene, SolverConfig};
+    use drystone::{Reference, SolverConfig};
+    use drystone_scenes::Scene;
 
     #[test]
     fn every_contact_joint_and_box_has_its_lines() {
         let scene = Scene::find("bridge", &[]).expect("a scene");
         let reference = Box::new(Reference::<f32>::new());
-        let mut simulation = Simulation::new(scene.world, SolverConfig::default(), reference).expect("a simulation");
+        let mut simulation = Simulation::with(scene.world, SolverConfig::default(), reference).expect("a simulation");
         simulation.step(scene.dt).expect("a step");
         let points: usize = simulation.manifolds().map(|m| m.points().len()).sum();
         assert!(points > 0);

@@ -2,8 +2,8 @@
 
 use drystone::backend::BackendChoice;
 use drystone::glam::{Vec2, Vec3};
-use drystone::scenes::CATALOGUE;
-use drystone::{Body, BodyKind, Scene, SolverConfig, World};
+use drystone::{Body, BodyKind, SolverConfig, World};
+use drystone_scenes::{CATALOGUE, Scene};
 use drystone_view::{Bounds, Camera, ColorBy, Eye, Live, Show as _};
 
 const ASPECT: f32 = 1.5;

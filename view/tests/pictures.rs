@@ -9,7 +9,8 @@ use std::path::Path;
 
 use compared::{PERCENT, difference, read_png};
 use drystone::glam::Vec3;
-use drystone::{Scene, Simulation, SolverConfig};
+use drystone::{Simulation, SolverConfig};
+use drystone_scenes::Scene;
 use drystone_view::{Bounds, Camera, Canvas, ColorBy, Film, Look, Picture, Shades, Shot, poses, wgpu};
 
 tests! {
@@ -36,8 +37,8 @@ const LOOK: Look = Look { yaw: 30.0_f32.to_radians(), pitch: 25.0_f32.to_radians
 /// A picture of `scene` after `steps`.
 fn picture(scene: &Scene, steps: u32, color: ColorBy) -> Picture {
     let reference = Box::new(drystone::Reference::<f32>::new());
-    let mut simulation =
-        Simulation::new(scene.world.clone(), SolverConfig::default().without_sleep(), reference).expect("a simulation");
+    let mut simulation = Simulation::with(scene.world.clone(), SolverConfig::default().without_sleep(), reference)
+        .expect("a simulation");
     for _ in 0..steps {
         simulation.step(scene.dt).expect("a step");
     }

@@ -2,9 +2,9 @@
 
 use drystone::backend::gpu::GpuOptions;
 use drystone::preset::Preset;
-use drystone::scenes::CATALOGUE;
 use drystone::stages::suggest::{hint, shorten};
-use drystone::{Backend, Cpu, Error, Gpu, Result, Scene, SolverConfig};
+use drystone::{Backend, Cpu, Error, Gpu, Result, SolverConfig};
+use drystone_scenes::{CATALOGUE, Scene};
 use serde_json::{Map, Value};
 
 /// Largest number of bodies of a scene in the page: about 4 kB each, and WebAssembly has at most 4 GiB.

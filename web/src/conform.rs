@@ -1,6 +1,6 @@
 //! Checks of the WebGPU of this browser.
 
-use drystone::conform::{ConformOptions, Verdict, conform_async};
+use drystone_conform::{ConformOptions, Verdict, conform_async};
 use js_sys::Function;
 use wasm_bindgen::prelude::*;
 
@@ -12,8 +12,8 @@ use crate::thrown;
 #[wasm_bindgen]
 pub async fn conform(short: bool, names: Vec<String>, each: Function) -> std::result::Result<String, JsError> {
     let options = ConformOptions { short, names, ..ConformOptions::default() };
-    let mut tell = |check: &drystone::conform::Check| {
-        let drystone::conform::Check { verdict, mode, group, name, figure, .. } = check;
+    let mut tell = |check: &drystone_conform::Check| {
+        let drystone_conform::Check { verdict, mode, group, name, figure, .. } = check;
         let line = format!("{verdict}: {mode}, {group}, {name}: {figure}");
         // Continue even if a listener fails.
         let _ = each.call1(&JsValue::NULL, &line.into());

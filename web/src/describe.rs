@@ -2,7 +2,7 @@
 
 use drystone::SolverConfig;
 use drystone::preset::Preset;
-use drystone::scenes::{CATALOGUE, Entry, Parameter};
+use drystone_scenes::{CATALOGUE, Entry, Parameter};
 use serde_json::{Map, Value, json};
 
 /// Every scene with its parameters.

@@ -11,8 +11,8 @@ mod show;
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use drystone::scenes::Spawners;
-use drystone::{Cpu, Result, Simulation, SolverConfig};
+use drystone::{Result, Simulation};
+use drystone_scenes::Spawners;
 use wasm_bindgen::prelude::*;
 
 /// A number that is unique in the page.
@@ -60,7 +60,7 @@ pub fn hash_after(scene: &str, parameters: Vec<String>, steps: u32) -> std::resu
 fn hash_of(scene: &str, parameters: &[String], steps: u32) -> Result<String> {
     let scene = choice::scene(scene, parameters)?;
     let mut spawners = Spawners::new(&scene);
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(Cpu::new()))?;
+    let mut simulation = Simulation::new(scene.world)?;
     for _ in 0..steps {
         spawners.before_step(&mut simulation.world, scene.dt);
         simulation.step(scene.dt)?;

@@ -1,8 +1,8 @@
 //! A scene without pictures and recording, for measurements: of a device by the page, of engines by web/measure.
 
 use drystone::metrics::Penetration;
-use drystone::scenes::SceneFile;
-use drystone::{Cpu, Error, Result, Scene, Simulation};
+use drystone::{Cpu, Error, Result, Simulation};
+use drystone_scenes::{Scene, SceneFile};
 use glam::{Quat, Vec3};
 use wasm_bindgen::prelude::*;
 
@@ -21,7 +21,7 @@ pub struct Bare {
 impl Bare {
     fn of(text: &str, settings: &str) -> Result<Self> {
         let Scene { world, dt, .. } = SceneFile::parse(text)?.into_scene("scene")?;
-        Ok(Self { simulation: Simulation::new(world, choice::config(settings)?, Box::new(Cpu::new()))?, dt })
+        Ok(Self { simulation: Simulation::with(world, choice::config(settings)?, Box::new(Cpu::new()))?, dt })
     }
 
     fn overlap(&self, poses: &[f32]) -> Result<Penetration> {

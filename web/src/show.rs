@@ -2,9 +2,9 @@
 
 use drystone::backend::BackendChoice;
 use drystone::metrics::rms_speed;
-use drystone::scenes::SceneFile;
-use drystone::stages::compare::BodyDifference;
-use drystone::{Cpu, Error, Recorder, RecordingIntervals, Replay, Result};
+use drystone::{Cpu, Error, Result};
+use drystone_conform::compare::BodyDifference;
+use drystone_scenes::{Recorder, RecordingIntervals, Replay, SceneFile};
 use drystone_view::{Camera, ColorBy, Live, Overlay, Pointer, Show as _};
 use glam::Vec2;
 use serde_json::{Map, Value, json};

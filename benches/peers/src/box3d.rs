@@ -8,7 +8,8 @@ use std::sync::Mutex;
 use box3d_sys::*;
 use drystone::glam::{Mat3, Quat, Vec3};
 use drystone::world::{BodyKind, Collider};
-use drystone::{Body, Error, Result, Scene, World};
+use drystone::{Body, Error, Result, World};
+use drystone_scenes::Scene;
 use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::parry::shape::{TriMesh, TypedShape};
 

@@ -3,9 +3,10 @@
 use clap::ValueEnum;
 #[cfg(not(all(feature = "physx", feature = "bullet")))]
 use drystone::Error;
-use drystone::{Result, Scene, SolverConfig};
+use drystone::{Result, SolverConfig};
 use drystone_cli::report::comparison::{Contender, Drystone};
 use drystone_cli::settings;
+use drystone_scenes::Scene;
 
 use crate::{box3d::Box3d, rapier::Rapier};
 

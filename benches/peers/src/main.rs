@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use comfy_table::{CellAlignment, Table, presets};
-use drystone::{Error, Result, Scene};
+use drystone::{Error, Result};
+use drystone_scenes::Scene;
 use drystone_cli::commands::SurveyArgs;
 use drystone_cli::files;
 use drystone_cli::report::comparison::{Origin, Row, blocks, measure, scene};

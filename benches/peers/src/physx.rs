@@ -9,7 +9,8 @@ use std::sync::{LazyLock, Mutex, MutexGuard};
 
 use drystone::glam::{Quat, Vec3};
 use drystone::world::{BodyKind, Collider};
-use drystone::{Body, Error, Result, Scene, World};
+use drystone::{Body, Error, Result, World};
+use drystone_scenes::Scene;
 use drystone_cli::report::comparison::{Contender, Setting};
 use physx_sys::*;
 use rapier3d::parry::shape::{TriMesh, TypedShape};

@@ -1,7 +1,8 @@
 //! rapier3d, from a drystone world and back.
 
 use drystone::world::{BodyKind, MassProperties as Mass};
-use drystone::{Body, Error, Result, Scene, World};
+use drystone::{Body, Error, Result, World};
+use drystone_scenes::Scene;
 use drystone_cli::report::comparison::{Contender, Setting};
 use rapier3d::prelude::*;
 

@@ -1,6 +1,7 @@
 //! The other engines as a report has them: at their defaults, and over their substeps and the stiffness of their contacts.
 
-use drystone::{Result, Scene};
+use drystone::Result;
+use drystone_scenes::Scene;
 use drystone_cli::report::comparison::{Contender, Extent, substeps};
 
 use crate::{BulletSolver, Engine, Entrant};

@@ -1,7 +1,7 @@
 //! That engines are compiled as their users compile them.
 #![cfg(feature = "physx")]
 
-use drystone::Scene;
+use drystone_scenes::Scene;
 use drystone_peers::{Engine, Entrant};
 
 /// Whether a text is in this program, which the library is linked into. Texts are given backwards, so that they are not here themselves.

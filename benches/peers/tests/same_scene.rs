@@ -2,7 +2,8 @@
 
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{Penetration, in_place_count};
-use drystone::{Body, Joint, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Joint, Reference, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 use drystone_peers::{Engine, Entrant};
 
 /// The world after `steps` of the scene, by an engine at its defaults.
@@ -19,7 +20,7 @@ fn run_at(entrant: &Entrant, scene: &Scene, steps: u32) -> World {
 /// By drystone's own query, at the poses of a world.
 fn penetration(world: &World) -> Penetration {
     let backend = Box::new(Reference::<f32>::new());
-    Simulation::new(world.clone(), SolverConfig::default(), backend).expect("a world").penetration()
+    Simulation::with(world.clone(), SolverConfig::default(), backend).expect("a world").penetration()
 }
 
 /// Deepest and mean overlap at the end of a scene of the catalogue [mm].

@@ -8,8 +8,8 @@ use super::scene::{SceneArgs, WorldsArgs};
 use super::words;
 use crate::adapter;
 use drystone::backend::{BackendChoice, choose};
-use drystone::stages::compare::compare;
 use drystone::{Error, Result};
+use drystone_conform::compare::compare;
 
 #[derive(Args)]
 pub struct CompareArgs {

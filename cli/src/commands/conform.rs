@@ -11,7 +11,7 @@ use crate::files;
 use crate::report::junit;
 use drystone::Result;
 use drystone::backend::gpu::{Faults, GpuOptions};
-use drystone::conform::{Check, ConformOptions, Conformance, Group, Mode, Verdict, conform, one_percent_off};
+use drystone_conform::{Check, ConformOptions, Conformance, Group, Mode, Verdict, conform, one_percent_off};
 use serde_json::{Value, json};
 
 /// Check an adapter and its driver.

@@ -8,8 +8,9 @@ use super::output::{print, replacing};
 use super::scene::check_touching;
 use crate::files;
 use crate::report::problem_of_step;
-use drystone::scenes::CATALOGUE;
-use drystone::{ContactProblem, Error, Result, Scene};
+use drystone::{Error, Result};
+use drystone_problems::ContactProblem;
+use drystone_scenes::{CATALOGUE, Scene};
 
 #[derive(Args)]
 pub struct ExportArgs {

@@ -16,8 +16,8 @@ use crate::report::{Shard, hard_cases, hard_families};
 use crate::settings;
 use drystone::backend::BackendKind;
 use drystone::preset::Preset;
-use drystone::scenes::Family;
 use drystone::{Result, SolverConfig};
+use drystone_scenes::Family;
 
 #[derive(Args)]
 pub struct HardArgs {

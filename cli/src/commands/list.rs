@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 use super::output::{print, print_json};
 use super::words;
 use drystone::preset::Preset;
-use drystone::scenes::{CATALOGUE, Entry, Parameter, schema};
 use drystone::{Result, SolverConfig};
+use drystone_scenes::{CATALOGUE, Entry, Parameter, schema};
 
 #[derive(Args)]
 pub struct ScenesArgs {

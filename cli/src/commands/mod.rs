@@ -34,8 +34,8 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind as Usage};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use drystone::scenes::CATALOGUE;
 use drystone::stages::suggest::nearest;
+use drystone_scenes::CATALOGUE;
 
 /// Simulate contact between rigid bodies: run scenes, compare backends, solve contact problems.
 #[derive(Parser)]

@@ -11,10 +11,9 @@ use super::words;
 use crate::files;
 use crate::view::{Output, recorded};
 use drystone::backend::{BackendChoice, choose};
-use drystone::scenes::CATALOGUE;
-use drystone::scenes::Spawners;
 use drystone::stages::memory;
-use drystone::{Error, Reference, Replay, Result, Scene, Simulation, SolverConfig};
+use drystone::{Error, Reference, Result, Simulation, SolverConfig};
+use drystone_scenes::{CATALOGUE, Replay, Scene, Spawners};
 use drystone_view::{Canvas, ColorBy, Film, Look, evenly, scene_of};
 
 /// Memory of a body in a frame: pose and color (bytes).
@@ -118,7 +117,7 @@ impl RenderArgs {
         let mut spawners = Spawners::new(&scene);
         let mut simulation = match &mut replay {
             Some(replay) => replay.begin(backend)?,
-            None => Simulation::new(scene.world.clone(), config, backend)?,
+            None => Simulation::with(scene.world.clone(), config, backend)?,
         };
         let bar = Progress::steps(scene.steps, quiet);
         let (steps, dt) = (scene.steps, scene.dt);

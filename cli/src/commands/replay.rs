@@ -8,7 +8,8 @@ use super::output::{plain_table, print, print_json};
 use super::progress::Progress;
 use super::scene::{BackendArgs, set_threads};
 use drystone::backend::choose;
-use drystone::{Error, Reference, Replay, Result};
+use drystone::{Error, Reference, Result};
+use drystone_scenes::Replay;
 
 #[derive(Args)]
 pub struct ReplayArgs {

@@ -12,8 +12,8 @@ use super::scene::{BackendArgs, MACHINE, OUTPUT, SceneArgs, SleepArgs, WorldsArg
 use crate::files::{self, Draft};
 use crate::report::{RunReport, Trajectory};
 use drystone::backend::choose;
-use drystone::scenes::{SceneFile, Spawners};
-use drystone::{Error, Recorder, RecordingIntervals, Result, Scene, Simulation};
+use drystone::{Error, Result, Simulation};
+use drystone_scenes::{Recorder, RecordingIntervals, Scene, SceneFile, Spawners};
 
 #[derive(Args)]
 pub struct RunArgs {
@@ -105,7 +105,7 @@ impl RunArgs {
         let mut report = RunReport::new(&scene, &config, &*backend);
         report.copy_bandwidth = copy_bandwidth;
         let mut spawners = Spawners::new(&scene);
-        let mut simulation = Simulation::new(std::mem::take(&mut scene.world), config, backend)?;
+        let mut simulation = Simulation::with(std::mem::take(&mut scene.world), config, backend)?;
         let draft = self.record.as_deref().map(Draft::of).transpose()?;
         let recorder = draft.as_ref().map(|draft| self.recorder(&scene.name, draft, &mut simulation)).transpose();
         let named = |error: Error| match &self.record {
@@ -120,7 +120,7 @@ impl RunArgs {
                 let stats = match self.save_problem.as_ref().filter(|save| save.0 == step) {
                     Some((_, file)) => {
                         let name = format!("{}, step {step}", scene.name);
-                        let (problem, stats) = simulation.step_with_contacts(&name, scene.dt)?;
+                        let (problem, stats) = drystone_problems::step_with_contacts(&mut simulation, &name, scene.dt)?;
                         check_touching(&problem)?;
                         replacing(file, || files::write(file, problem.to_text().as_bytes()))?;
                         stats

@@ -7,15 +7,16 @@ use clap::Args;
 use super::output::say;
 use super::words;
 use crate::settings;
-#[cfg(feature = "view")]
-use drystone::Replay;
 use drystone::backend::BackendChoice;
 use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP};
 use drystone::load::Load;
 use drystone::preset::Preset;
-use drystone::scenes::CATALOGUE;
 use drystone::stages::memory;
-use drystone::{ContactProblem, Error, Result, Scene, SolverConfig};
+use drystone::{Error, Result, SolverConfig};
+use drystone_problems::ContactProblem;
+#[cfg(feature = "view")]
+use drystone_scenes::Replay;
+use drystone_scenes::{CATALOGUE, Scene};
 
 // Headings of options in the help.
 pub(super) const SCENE: &str = "Scene";

@@ -9,10 +9,10 @@ use super::words::{self, SolveMethod};
 use crate::report::{CurveRow, NewtonReport, SolveReport, SolveSettings};
 use drystone::backend::BackendKind;
 use drystone::config::Method;
-use drystone::contacts::Problem;
-use drystone::solver::Order;
-use drystone::solver::newton::{Ended, NewtonEnded};
 use drystone::{Error, Result};
+use drystone_problems::contacts::Problem;
+use drystone_problems::solver::Order;
+use drystone_problems::solver::newton::{Ended, NewtonEnded};
 
 /// Largest number of sweeps with a tolerance.
 const MOST_SWEEPS: u32 = 40_000;

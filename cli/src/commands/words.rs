@@ -5,11 +5,11 @@ use std::str::FromStr;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use drystone::backend::{BackendChoice, BackendKind};
 use drystone::config::Method;
-#[cfg(feature = "gpu")]
-use drystone::conform::Group;
 use drystone::preset::Preset;
-use drystone::scenes::Family;
-use drystone::solver::Order;
+#[cfg(feature = "gpu")]
+use drystone_conform::Group;
+use drystone_problems::solver::Order;
+use drystone_scenes::Family;
 #[cfg(feature = "view")]
 use drystone_view::ColorBy;
 

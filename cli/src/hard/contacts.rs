@@ -4,7 +4,8 @@ use glam::{Quat, Vec3};
 
 use super::{Checks, DT, LEAST, Setup, cube, energy, floor, watch, weightless};
 use drystone::stats::largest;
-use drystone::{Body, MassProperties, Result, Scene, Shape, World, metrics};
+use drystone::{Body, MassProperties, Result, Shape, World, metrics};
+use drystone_scenes::Scene;
 
 pub(super) fn overlaps(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for share in [0.25, 0.5, 1.0_f32] {

@@ -5,9 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use cpu_time::ThreadTime;
-use drystone::scenes::{Family, Law, Member};
 use drystone::stats::{largest, median};
-use drystone::{Error, Result, Scene, Simulation, StepStats, World, metrics};
+use drystone::{Error, Result, Simulation, StepStats, World, metrics};
+use drystone_scenes::{Family, Law, Member, Scene};
 use glam::Vec3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 

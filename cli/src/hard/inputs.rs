@@ -4,7 +4,8 @@ use glam::{Quat, Vec3};
 
 use super::{Checks, DT, Setup, cube, floor};
 use drystone::stats::largest;
-use drystone::{Body, Result, Scene, World};
+use drystone::{Body, Result, World};
+use drystone_scenes::Scene;
 
 pub(super) fn far_and_bad(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let at_origin = settled(setup, 0.0)?;

@@ -8,7 +8,8 @@ mod stacks;
 
 use drystone::stages::suggest::hint;
 use drystone::stats::largest;
-use drystone::{Backend, Body, Error, Result, Scene, Shape, Simulation, SolverConfig, World, metrics};
+use drystone::{Backend, Body, Error, Result, Shape, Simulation, SolverConfig, World, metrics};
+use drystone_scenes::Scene;
 use glam::Vec3;
 
 pub use motions::{Tumble, flip_time, rolling_error};
@@ -84,13 +85,13 @@ pub struct Setup<'a> {
 
 impl Setup<'_> {
     fn simulation(&self, world: World) -> Result<Simulation> {
-        Simulation::new(world, self.config.clone(), (self.open)()?)
+        Simulation::with(world, self.config.clone(), (self.open)()?)
     }
 
     /// A simulation whose bodies can fall asleep, like the default.
     fn sleeping(&self, world: World) -> Result<Simulation> {
         let config = self.config.clone().with(|c| c.sleep_after = SolverConfig::default().sleep_after);
-        Simulation::new(world, config, (self.open)()?)
+        Simulation::with(world, config, (self.open)()?)
     }
 
     fn run(&self, spec: &str, steps: u32) -> Result<Outcome> {

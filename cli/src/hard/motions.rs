@@ -7,7 +7,8 @@ use glam::{DVec3, Quat, Vec3};
 use super::{Checks, DT, LEAST, Setup, energy, floor, off, watch, weightless};
 use drystone::config::Friction;
 use drystone::stats::largest;
-use drystone::{Body, Joint, MassProperties, Result, Scene, Shape, Simulation, World, metrics};
+use drystone::{Body, Joint, MassProperties, Result, Shape, Simulation, World, metrics};
+use drystone_scenes::Scene;
 
 pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
     const LINKS: usize = 100;
@@ -162,7 +163,7 @@ pub fn rolling_error(angle: f32, simulation: impl FnOnce(World) -> Result<Simula
 pub(super) fn rolling(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let error = |angle: f32, friction: Friction| {
         let config = setup.config.clone().with(|c| c.friction = friction);
-        rolling_error(angle, |world| Simulation::new(world, config, (setup.open)()?))
+        rolling_error(angle, |world| Simulation::with(world, config, (setup.open)()?))
     };
     let across = error(60.0, Friction::Box)?;
     checks.at_most("disc, 60 degrees: mean squared error [m²/s²]", error(60.0, Friction::Disc)?, 1e-5);

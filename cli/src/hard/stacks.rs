@@ -3,10 +3,11 @@
 use super::{Checks, DT, Limit, Setup};
 use drystone::config::Method;
 use drystone::load::Load;
-use drystone::residuals::Measure;
-use drystone::solver::{Order, Solver};
 use drystone::stats::largest;
-use drystone::{Body, Result, Scene, Shape, SolvedManifold, World};
+use drystone::{Body, Result, Shape, SolvedManifold, World};
+use drystone_problems::residuals::Measure;
+use drystone_problems::solver::{Order, Solver};
+use drystone_scenes::Scene;
 
 /// Number of sweeps over the first step; a power of two.
 const SWEEPS: u32 = 4096;
@@ -101,7 +102,7 @@ fn asymmetry(manifolds: impl Iterator<Item = SolvedManifold> + Clone, side: usiz
 
 /// The largest growth of e_vel when the number of plain f64 sweeps over the first step doubles, and the last e_vel.
 fn convergence(setup: &Setup, world: World) -> Result<(f64, f64)> {
-    let problem = setup.simulation(world)?.step_with_contacts("first step", DT)?.0;
+    let problem = drystone_problems::step_with_contacts(&mut setup.simulation(world)?, "first step", DT)?.0;
     let mut solver = Solver::new(&problem, Method::Plain, Order::Manifolds, None)?;
     let measure = Measure::new(&problem);
     let mut error = |sweeps: u32| -> Result<f64> {

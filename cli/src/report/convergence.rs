@@ -5,7 +5,9 @@ use std::path::Path;
 
 use drystone::config::Method;
 use drystone::stats::median;
-use drystone::{ContactProblem, Cpu, Error, Result, Scene, Simulation, SolverConfig};
+use drystone::{Cpu, Error, Result, Simulation, SolverConfig};
+use drystone_problems::ContactProblem;
+use drystone_scenes::Scene;
 
 use super::run::RunReport;
 use super::solve::{SolveReport, SolveSettings};
@@ -91,7 +93,7 @@ fn runs(page: &mut String) -> Result<()> {
                 });
                 let backend = Box::new(Cpu::new());
                 let mut report = RunReport::new(&scene, &config, &*backend);
-                let mut simulation = Simulation::new(scene.world.clone(), config, backend)?;
+                let mut simulation = Simulation::with(scene.world.clone(), config, backend)?;
                 (0..steps).try_for_each(|_| simulation.step(scene.dt).map(|stats| report.add(&stats)))?;
                 report.measure(&scene, simulation);
                 let RunReport { in_place, bodies, penetration_max: deepest, speed_rms: speed, .. } = report;
@@ -114,9 +116,9 @@ fn kind_name((method, passes): (Method, u8)) -> String {
 
 /// The contact problem of a step of a scene at default settings without sleep; step 1 is the first.
 pub fn problem_of_step(scene: Scene, step: u32) -> Result<ContactProblem> {
-    let mut simulation = Simulation::new(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
+    let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
     (1..step).try_for_each(|_| simulation.step(scene.dt).map(drop))?;
-    Ok(simulation.step_with_contacts(&format!("{}, step {step}", scene.name), scene.dt)?.0)
+    Ok(drystone_problems::step_with_contacts(&mut simulation, &format!("{}, step {step}", scene.name), scene.dt)?.0)
 }
 
 /// Contact problems: steps of catalogue scenes, then the `.contacts` files of a folder by their names.

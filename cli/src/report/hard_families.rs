@@ -6,7 +6,7 @@ use super::prose::wrapped;
 use crate::hard::families::FamilyShare;
 use drystone::Result;
 use drystone::preset::Preset;
-use drystone::scenes::Family;
+use drystone_scenes::Family;
 
 const PRESETS: [Preset; 3] = [Preset::Fast, Preset::Balanced, Preset::Accurate];
 

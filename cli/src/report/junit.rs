@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use drystone::conform::{Check, Conformance, Verdict};
+use drystone_conform::{Check, Conformance, Verdict};
 
 /// The text of the file.
 pub fn text(found: &Conformance) -> String {
@@ -57,7 +57,7 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use drystone::backend::gpu::AdapterSummary;
-    use drystone::conform::{Group, Mode};
+    use drystone_conform::{Group, Mode};
 
     use super::*;
 

@@ -12,7 +12,8 @@ use serde::Serialize;
 use crate::hard::energy;
 use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
 use drystone::stats::{HardestContact, KernelTime, median};
-use drystone::{Backend, BodyKind, Scene, Simulation, SolverConfig, StepStats, World};
+use drystone::{Backend, BodyKind, Simulation, SolverConfig, StepStats, World};
+use drystone_scenes::Scene;
 use glam::Vec3;
 
 /// Bodies whose islands take the same number of substeps.

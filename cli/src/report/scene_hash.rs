@@ -3,7 +3,8 @@
 use std::fmt::{self, Debug, Write};
 use std::hash::Hasher;
 
-use drystone::{BodyHandle, Joint, Material, Scene};
+use drystone::{BodyHandle, Joint, Material};
+use drystone_scenes::Scene;
 use fnv::FnvHasher;
 
 /// Feeds text to a hasher.

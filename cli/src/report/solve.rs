@@ -5,12 +5,12 @@ use std::time::Duration;
 use serde::Serialize;
 
 use drystone::config::Method;
-use drystone::contacts::{ContactProblem, LocalProblem, Problem};
 use drystone::glam::DVec3;
-use drystone::residuals::{Measure, Residuals};
-use drystone::solver::newton::{Blocks, Bodies, Ended, NewtonEnded, Outcome, Sweeps, newton};
-use drystone::solver::{Order, Solver};
 use drystone::{Backend, Result};
+use drystone_problems::contacts::{ContactProblem, LocalProblem, Problem};
+use drystone_problems::residuals::{Measure, Residuals};
+use drystone_problems::solver::newton::{Blocks, Bodies, Ended, NewtonEnded, Outcome, Sweeps, newton};
+use drystone_problems::solver::{Order, Solver};
 
 use super::rounds::Clock;
 

@@ -4,9 +4,9 @@ mod judge;
 mod worlds;
 
 use cpu_time::ProcessTime;
-use drystone::scenes::Spawners;
 use drystone::stages::memory;
-use drystone::{Cpu, Error, Result, Scene, Simulation, SolverConfig};
+use drystone::{Error, Result, Simulation};
+use drystone_scenes::{Scene, Spawners};
 
 pub use judge::judge;
 use worlds::Acts;
@@ -67,7 +67,7 @@ impl Soaked {
         spec.clone_into(&mut scene.name);
         let spawners = Spawners::new(&scene);
         let world = std::mem::take(&mut scene.world);
-        let simulation = Simulation::new(world, SolverConfig::default(), Box::new(Cpu::new()))?;
+        let simulation = Simulation::new(world)?;
         Ok(Self { scene, spawners, acts, simulation, step: 0 })
     }
 

@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use drystone::stages::random::SplitMix64;
-use drystone::{Body, BodyHandle, Joint, Result, Scene, Shape, World};
+use drystone::{Body, BodyHandle, Joint, Result, Shape, World};
+use drystone_scenes::Scene;
 use glam::{Quat, Vec3};
 
 /// The worlds by name, each with a one-line description.

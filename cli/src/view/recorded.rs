@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use drystone::glam::{Quat, Vec3};
-use drystone::{BodyKind, Error, Result, Scene};
+use drystone::{BodyKind, Error, Result};
+use drystone_scenes::Scene;
 use drystone_view::{ColorBy, Film};
 
 /// Step, time, body, center of mass, rotation and velocities, in the format of [`crate::report::Trajectory`].

@@ -23,7 +23,7 @@ fn tumble(backend: Box<dyn Backend>, first: f32) -> Tumble {
 
 fn tumble_by(substeps: u32, backend: Box<dyn Backend>, first: f32) -> Tumble {
     let config = SolverConfig::default().without_sleep().with(|c| c.substeps = substeps);
-    Tumble::new(first, |world| Simulation::new(world, config, backend)).expect("a tumble")
+    Tumble::new(first, |world| Simulation::with(world, config, backend)).expect("a tumble")
 }
 
 /// Measured: 3e-5 for the first flip, 1.7e-5 for energy, 8.5e-6 for momentum. Later flips are not tested: this motion differs by 5e-7

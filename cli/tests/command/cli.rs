@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use drystone::Scene;
+use drystone_scenes::Scene;
 use serde_json::Value;
 
 /// A folder for one test, in which the commands run.

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use crate::common::contacts::{sweeps_to, tower};
-use drystone::ContactProblem;
 use drystone::config::Method;
-use drystone::solver::Order;
+use drystone_problems::ContactProblem;
+use drystone_problems::solver::Order;
 
 fn run(folder: &Path, arguments: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drystone"));

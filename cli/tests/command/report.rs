@@ -6,13 +6,14 @@ use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use drystone::{Error, Result, Scene, SolverConfig, World};
+use drystone::{Error, Result, SolverConfig, World};
 use drystone_cli::files;
 use drystone_cli::report::bench::{FallingRow, GrowthRow, LimitRow, StatesRow, WorldsRow};
 use drystone_cli::report::comparison::{
     Contender, Drystone, Extent, Origin, Report, Setting, Survey, Team, WindowRow, scene, scenes as all, tables,
 };
 use drystone_cli::report::{Shard, performance};
+use drystone_scenes::Scene;
 
 /// A page that is not drawn after so long is never drawn, on any machine.
 const HANGS: Duration = Duration::from_secs(20 * 60);

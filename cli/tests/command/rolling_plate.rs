@@ -6,7 +6,7 @@ use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig};
 use drystone_cli::hard::rolling_error;
 
 fn error(angle: f32, config: SolverConfig, backend: Box<dyn Backend>) -> f64 {
-    rolling_error(angle, |world| Simulation::new(world, config, backend)).expect("a run")
+    rolling_error(angle, |world| Simulation::with(world, config, backend)).expect("a run")
 }
 
 #[test]

@@ -1,14 +1,15 @@
 //! The report of a run: groups, joints and sweeps.
 
 use drystone::glam::Vec3;
-use drystone::{Reference, Scene, Simulation, SolverConfig};
+use drystone::{Reference, Simulation, SolverConfig};
 use drystone_cli::report::RunReport;
+use drystone_scenes::Scene;
 
 #[test]
 fn the_report_names_the_largest_tower_that_stands() {
     let mut scene = Scene::find("tallest", &["n=6".into(), "step=2".into()]).expect("towers");
     let (config, reference) = (SolverConfig::default().without_sleep(), Box::new(Reference::<f32>::new()));
-    let mut simulation = Simulation::new(scene.world.clone(), config.clone(), reference).expect("a simulation");
+    let mut simulation = Simulation::with(scene.world.clone(), config.clone(), reference).expect("a simulation");
     for _ in 0..10 {
         simulation.step(scene.dt).expect("a step");
     }
@@ -38,7 +39,7 @@ fn the_report_counts_joints_and_the_sweeps_that_a_tolerance_saved() {
     });
     let reference = Box::new(Reference::<f32>::new());
     let mut report = RunReport::new(&scene, &config, &*reference);
-    let mut simulation = Simulation::new(scene.world.clone(), config, reference).expect("a simulation");
+    let mut simulation = Simulation::with(scene.world.clone(), config, reference).expect("a simulation");
     for _ in 0..5 {
         report.add(&simulation.step(scene.dt).expect("a step"));
     }

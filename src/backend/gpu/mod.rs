@@ -14,6 +14,7 @@
 
 mod adapter;
 pub(crate) mod bindings;
+pub(crate) mod blocking;
 mod buffers;
 mod dispatch;
 mod kept;
@@ -35,12 +36,13 @@ pub use options::{Faults, GpuOptions, Loss};
 
 use super::cpu::Cpu;
 use super::{Backend, CheckedStep, Running};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::carry::Carry;
 use crate::problem::{BodyRow, StepProblem};
 use crate::stats::{KernelTime, Traffic};
 use bindings::Binding;
+use blocking::block_on;
 use buffers::Buffers;
 use dispatch::Dispatch;
 use pipelines::{Pipelines, Shaders};
@@ -119,12 +121,13 @@ impl Gpu {
     ///
     /// ```no_run
     /// use drystone::backend::gpu::GpuOptions;
-    /// use drystone::{Gpu, Scene, Simulation, SolverConfig};
+    /// use drystone::{Gpu, Simulation, SolverConfig};
+    /// use drystone_scenes::Scene;
     ///
     /// # async fn page() -> drystone::Result<()> {
     /// let gpu = Gpu::open_async(GpuOptions::default()).await?;
     /// let scene = Scene::find("pile", &["n=1000".into()])?;
-    /// let mut simulation = Simulation::new(scene.world, SolverConfig::default(), Box::new(gpu))?;
+    /// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(gpu))?;
     /// simulation.step_async(scene.dt).await?;
     /// # Ok(())
     /// # }
@@ -316,18 +319,6 @@ impl Gpu {
         self.traffic = Traffic { up: self.buffers.take_sent(), down, submissions, longest_submission, ..self.traffic };
         Ok(())
     }
-}
-
-/// Blocks this thread until the future completes.
-///
-/// # Errors
-/// Those of the future; or this is a web page, which cannot block.
-pub(crate) fn block_on<T>(future: impl Future<Output = Result<T>>) -> Result<T> {
-    if cfg!(target_family = "wasm") {
-        let instead = "use the functions whose names end in _async";
-        return Err(Error::Adapter(format!("a web page cannot block on a device: {instead}")));
-    }
-    pollster::block_on(future)
 }
 
 impl Backend for Gpu {

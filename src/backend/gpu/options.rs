@@ -22,7 +22,7 @@ pub struct GpuOptions {
     pub name: String,
     /// Exact mode: no driver can reassociate or fuse arithmetic, so that results equal the reference to the last bit.
     /// If the adapter accepts SPIR-V, its shaders carry a decoration that forbids both. Otherwise integers guard the
-    /// sums and products of the WGSL. That has kept the bits on every tested adapter; [`conform`](crate::conform) tests
+    /// sums and products of the WGSL. That has kept the bits on every tested adapter; `drystone-conform` tests
     /// this one.
     pub exact: bool,
     /// Whether exact mode uses the guarded WGSL even if the adapter accepts SPIR-V.
@@ -67,7 +67,7 @@ impl Default for GpuOptions {
 /// ```no_run
 /// use drystone::Gpu;
 /// use drystone::backend::gpu::{Faults, GpuOptions, Loss};
-/// use drystone::conform::one_percent_off;
+/// use drystone_conform::one_percent_off;
 ///
 /// // The first device is lost while it works on its third submission; the second one stays.
 /// let losses = vec![Loss { submission: 3, during: true }];

@@ -1,8 +1,8 @@
 //! Masses, materials and numbers of bodies that change, and changes that are refused.
 
 use drystone::glam::Vec3;
-use drystone::stages::compare::Difference;
 use drystone::{Body, Joint, Shape, Simulation, SolverConfig, World};
+use drystone_conform::compare::Difference;
 
 use super::{BOTH, DT, cpu, cube, run, simulation, standing};
 

@@ -18,7 +18,7 @@ fn cpu() -> Box<dyn Backend> {
 const BOTH: [fn() -> Box<dyn Backend>; 2] = [reference, cpu];
 
 fn simulation(world: &World, config: &SolverConfig, backend: fn() -> Box<dyn Backend>) -> Simulation {
-    Simulation::new(world.clone(), config.clone(), backend()).expect("a good world")
+    Simulation::with(world.clone(), config.clone(), backend()).expect("a good world")
 }
 
 fn run(simulation: &mut Simulation, steps: u32) {

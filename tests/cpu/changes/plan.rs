@@ -1,8 +1,9 @@
 //! The length of a step: impulses and preloads follow it, and so does the plan.
 
 use drystone::glam::Vec3;
-use drystone::stages::compare::Difference;
-use drystone::{Body, Joint, Scene, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::{Body, Joint, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone_conform::compare::Difference;
+use drystone_scenes::Scene;
 
 use super::{BOTH, DT, cpu, cube, fastest, ground, reference, run, simulation, standing};
 

@@ -2,8 +2,8 @@
 
 use drystone::config::{Clamping, Friction, FrictionAt, FrictionOrder, FrictionSweeps, Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
-use drystone::stages::compare::Difference;
 use drystone::{Simulation, SolverConfig};
+use drystone_conform::compare::Difference;
 
 use super::{BOTH, DT, cpu, fastest, net, reference, run, simulation, standing};
 
@@ -178,7 +178,7 @@ fn as_many_colors_as_are_allowed_are_taken_from_the_step_on_in_which_they_are() 
     assert!(many > 2, "{many} colors");
     simulation.set_config(config.clone().with(|c| c.max_colors = 1)).expect("a setting");
     run(&mut simulation, 1);
-    let mut anew = Simulation::new(net(), simulation.config().clone(), cpu()).expect("a good world");
+    let mut anew = Simulation::with(net(), simulation.config().clone(), cpu()).expect("a good world");
     run(&mut anew, 1);
     assert_eq!(colors(&mut simulation), colors(&mut anew));
     assert_ne!(colors(&mut simulation), many);

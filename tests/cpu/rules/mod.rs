@@ -17,7 +17,7 @@ const G: f32 = 9.81;
 const DT: f32 = 1.0 / 60.0;
 
 fn simulation(world: World, config: SolverConfig) -> Simulation {
-    Simulation::new(world, config, Box::new(Reference::<f32>::new())).expect("good settings")
+    Simulation::with(world, config, Box::new(Reference::<f32>::new())).expect("good settings")
 }
 
 fn run(simulation: &mut Simulation, steps: u32, dt: f32) -> StepStats {

@@ -5,7 +5,8 @@ use std::f32::consts::FRAC_PI_2;
 
 use drystone::config::FrictionAt;
 use drystone::stages::problem::PointRow;
-use drystone::{Body, Scene, Shape, SolverConfig, World};
+use drystone::{Body, Shape, SolverConfig, World};
+use drystone_scenes::Scene;
 use glam::{Quat, Vec3};
 
 use super::{DT, G, empty, floor, near, on_a_slope, run, simulation};

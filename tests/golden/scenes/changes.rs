@@ -1,7 +1,8 @@
 //! Sleep, worlds beside each other, bodies that come and go, and states that are saved and loaded.
 
 use drystone::glam::{Quat, Vec3};
-use drystone::{Body, Groups, Joint, Listen, Reference, Scene, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Groups, Joint, Listen, Reference, Shape, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 use super::Golden;
 

@@ -6,7 +6,8 @@ mod jointed;
 mod rules;
 mod shapes;
 
-use drystone::{Backend, Reference, Scene, Simulation, SolverConfig, World};
+use drystone::{Backend, Reference, Simulation, SolverConfig, World};
+use drystone_scenes::Scene;
 
 use super::table::Row;
 
@@ -44,7 +45,7 @@ impl Golden {
     /// Runs the scene, calls `after` after each step, and gives the row of the table and the backend.
     pub fn run(&self, backend: Box<dyn Backend>, mut after: impl FnMut(&Simulation)) -> (Row, Box<dyn Backend>) {
         let (world, config) = (self.start)();
-        let mut simulation = Simulation::new(world, config, backend).expect("a fit world");
+        let mut simulation = Simulation::with(world, config, backend).expect("a fit world");
         for step in 0..self.steps {
             (self.before_step)(&mut simulation, step);
             simulation.step(self.dt).expect("a step");

@@ -25,7 +25,7 @@ export const mistakes = [
   { fails: "conform fails no check", script: falling("1.1"), scenes: [], modes: [], names: ["integrate_velocities"] },
 ];
 
-/// Largest difference after a step of what both backends began alike, relative to 1 plus its size: PLAIN_STEP of src/conform.
+/// Largest difference after a step of what both backends began alike, relative to 1 plus its size: PLAIN_STEP of drystone-conform.
 const LIMIT = 1e-5;
 const SCENES = { wall: { rows: 4, columns: 4 }, pile: { n: 30 }, drop: {}, chain: {}, car: {}, ragdoll: {} };
 const STEPS = 40;

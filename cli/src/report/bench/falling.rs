@@ -7,9 +7,9 @@ use crate::report::rounds::{interleave, thirds};
 use crate::report::scene_hash::content_hash;
 use crate::settings;
 use drystone::metrics::{Penetration, rms_speed};
-use drystone::scenes::Spawners;
 use drystone::stats::{largest, median};
-use drystone::{Backend, Result, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{Backend, Result, Simulation, SolverConfig, StepStats};
+use drystone_scenes::{Scene, Spawners};
 
 pub const FALLING: [&str; 3] = ["pyramid:base=100", "pile:n=5120", "pile:n=20000"];
 pub const FALLING_QUICK: [&str; 2] = ["pyramid:base=20", "pile:n=1000"];
@@ -79,7 +79,7 @@ pub fn falling(
                     spec: spec.clone(),
                     hash: content_hash(&scene),
                     dt: scene.dt,
-                    simulation: Simulation::new(scene.world.clone(), config.clone(), backend)?,
+                    simulation: Simulation::with(scene.world.clone(), config.clone(), backend)?,
                     spawners: Spawners::new(&scene),
                     pool: pool(threads)?,
                     steps: Vec::new(),

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{column, memory, pool, stage_times};
 use drystone::stats::median;
-use drystone::{Cpu, Result, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{Cpu, Result, Simulation, SolverConfig, StepStats};
+use drystone_scenes::Scene;
 
 /// Plane pyramids, each one island, of 1,035, 10,011, 100,128 and 1,000,405 boxes.
 pub const GROWTH: [&str; 4] = ["pyramid:base=45", "pyramid:base=141", "pyramid:base=447", "pyramid:base=1414"];
@@ -47,7 +48,7 @@ pub fn growth(specs: &[String], threads: &[usize], after_scene: &mut dyn FnMut()
         let before = memory::begin();
         let Scene { world, dt, .. } = Scene::find_spec(spec)?;
         let boxes = world.dynamic_count();
-        let mut simulation = Simulation::new(world, config.clone(), Box::new(Cpu::new()))?;
+        let mut simulation = Simulation::with(world, config.clone(), Box::new(Cpu::new()))?;
         (0..SETTLE).try_for_each(|_| simulation.step(dt).map(drop))?;
         let count = (BODY_STEPS / boxes.max(1)).clamp(STEPS[0], STEPS[1]);
         let mut measured = Vec::new();

@@ -5,7 +5,8 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use drystone::stages::plan::Kernel;
-use drystone::{Backend, Cpu, Result, Scene, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::{Backend, Cpu, Result, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone_scenes::Scene;
 
 use super::rates::{peak, triad};
 use super::settled;
@@ -110,7 +111,7 @@ fn problem(spec: &str) -> Result<(usize, StepProblem)> {
     let mut simulation = if scene.container.is_some() {
         settled(spec, &config)?.0
     } else {
-        let mut simulation = Simulation::new(scene.world, config, Box::new(Cpu::new()))?;
+        let mut simulation = Simulation::with(scene.world, config, Box::new(Cpu::new()))?;
         (0..3).try_for_each(|_| simulation.step(dt).map(drop))?;
         simulation
     };

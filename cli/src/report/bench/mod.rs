@@ -29,9 +29,9 @@ use crate::report::rounds::{interleave, quartiles};
 use crate::report::scene_hash::content_hash;
 use crate::settings;
 use drystone::metrics::rms_speed;
-use drystone::scenes::Spawners;
 use drystone::stats::median;
-use drystone::{Backend, Error, Result, Scene, Simulation, SolverConfig, StepStats};
+use drystone::{Backend, Error, Result, Simulation, SolverConfig, StepStats};
+use drystone_scenes::{Scene, Spawners};
 
 /// The scenes of a full bench, as in [`Scene::find_spec`].
 pub const STANDARD: [&str; 9] = [
@@ -87,7 +87,7 @@ pub struct StagesRow {
     pub penetration_mean: f64,
     /// Root mean square speed (m/s).
     pub speed_rms: f64,
-    /// [`e_vel`](drystone::residuals::Residuals::e_vel) of the impulses after a substep in its contact problem without springs; none with joints.
+    /// [`e_vel`](drystone_problems::residuals::Residuals::e_vel) of the impulses after a substep in its contact problem without springs; none with joints.
     pub residual: Option<f64>,
 }
 
@@ -159,7 +159,7 @@ fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, Spawners, S
     let (hash, dt, falls) = (content_hash(&scene), scene.dt, scene.container.is_some());
     let coarse = config.clone().with(|c| c.substeps = 1);
     let mut spawners = Spawners::new(&scene);
-    let mut simulation = Simulation::new(scene.world, coarse, Box::new(drystone::Cpu::new()))?;
+    let mut simulation = Simulation::with(scene.world, coarse, Box::new(drystone::Cpu::new()))?;
     let mut step = |simulation: &mut Simulation| {
         spawners.before_step(&mut simulation.world, dt);
         simulation.step(dt).map(drop)
@@ -203,7 +203,8 @@ impl Case {
     fn rows(self, config: &SolverConfig) -> Vec<StagesRow> {
         let Self { spec, hash, dt, mut simulation, ways, last: stats, .. } = self;
         let penetration = simulation.penetration();
-        let residual = simulation.step_with_residuals(dt).ok().map(|residuals| residuals.e_vel);
+        let residual =
+            drystone_problems::step_with_residuals(&mut simulation, dt).ok().map(|residuals| residuals.e_vel);
         let world = &simulation.world;
         let row = |mut way: Way| {
             let [detect, color, prepare, run, store] = std::array::from_fn(|i| median(&column(&way.turns, i)));

@@ -46,7 +46,7 @@ pub fn worlds(
         for &count in counts {
             let mut world = one.world.clone();
             (1..count).for_each(|_| world.beside(&one.world));
-            let mut simulation = Simulation::new(world, config.clone(), Box::new(Cpu::new()))?;
+            let mut simulation = Simulation::with(world, config.clone(), Box::new(Cpu::new()))?;
             (0..SETTLE).try_for_each(|_| simulation.step(dt).map(drop))?;
             for &threads in threads {
                 let ms = pool(threads)?.install(|| ms_a_step(&mut simulation, dt))?;

@@ -3,8 +3,8 @@
 use crate::settings;
 use drystone::backend::BackendKind;
 use drystone::config::{Friction, Method};
-use drystone::scenes::Spawners;
-use drystone::{Result, Scene, Simulation, SolverConfig, World};
+use drystone::{Result, Simulation, SolverConfig, World};
+use drystone_scenes::{Scene, Spawners};
 
 /// An engine with its settings, stepping one scene.
 pub trait Contender {
@@ -79,7 +79,7 @@ pub struct Drystone {
 impl Drystone {
     pub fn new(scene: &Scene, backend: &str, config: &SolverConfig) -> Result<Self> {
         let backend = backend.parse::<BackendKind>()?.open(false)?;
-        let simulation = Simulation::new(scene.world.clone(), config.clone(), backend)?;
+        let simulation = Simulation::with(scene.world.clone(), config.clone(), backend)?;
         Ok(Self { simulation, spawners: Spawners::new(scene), dt: scene.dt })
     }
 }

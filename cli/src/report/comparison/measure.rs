@@ -10,7 +10,8 @@ use crate::report::scene_hash::content_hash;
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{Penetration, drift, in_place_count, rms_speed};
 use drystone::stats::{median, quantile};
-use drystone::{Error, Result, Scene, SolverConfig, World};
+use drystone::{Error, Result, SolverConfig, World};
+use drystone_scenes::Scene;
 
 /// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called [`blocks`] times per contender.
 pub fn measure(

@@ -3,7 +3,8 @@
 use super::contender::{Contender, Drystone, Extent};
 use crate::adapter;
 use crate::settings;
-use drystone::{Result, Scene, SolverConfig};
+use drystone::{Result, SolverConfig};
+use drystone_scenes::Scene;
 
 /// The scenes of a full and of a brief report that have at most 1,000 bodies.
 ///

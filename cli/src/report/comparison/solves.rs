@@ -9,7 +9,8 @@ use crate::report::rounds::interleave;
 use crate::report::solve::{SolveReport, SolveSettings};
 use drystone::config::Method;
 use drystone::stats::quantile;
-use drystone::{Backend, ContactProblem, Cpu, Result};
+use drystone::{Backend, Cpu, Result};
+use drystone_problems::ContactProblem;
 
 /// The solvers: a method, in f64 or on the CPU lanes.
 const SOLVERS: [(Method, &str); 4] =

@@ -15,7 +15,9 @@ use super::solves::{self, SolveRow, solves};
 use crate::files;
 use crate::report::scene_hash::content_hash;
 use crate::report::shard::{Measured, Shard, gathered, last_run, missing};
-use drystone::{ContactProblem, Error, Result, Scene};
+use drystone::{Error, Result};
+use drystone_problems::ContactProblem;
+use drystone_scenes::Scene;
 
 // Files of rows in the folder of a report.
 const SCENES: &str = "scenes.csv";

@@ -56,7 +56,8 @@ mod tests {
     use super::super::{Contender, Drystone, Origin};
     use super::*;
     use crate::report::rounds::thirds;
-    use drystone::{Scene, SolverConfig};
+    use drystone::SolverConfig;
+    use drystone_scenes::Scene;
 
     /// A lane over six blocks whose thirds have these times; it has errors of `finished` thirds, of one millimeter each.
     fn lane(ms: [f64; 3], finished: usize) -> Lane {

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use super::{DT, Line, RulesReport, simulate};
 use crate::report::plot::Scale;
 use drystone::metrics::{fastest, in_place, in_place_count};
-use drystone::{Body, Result, Scene, Shape, World};
+use drystone::{Body, Result, Shape, World};
+use drystone_scenes::Scene;
 use glam::{Quat, Vec3};
 
 /// Settings of a rule, with 8 substeps, so that the rule and not the length of the substep determines the motion.

@@ -10,7 +10,8 @@ use std::path::Path;
 use crate::files;
 use crate::settings;
 use drystone::metrics::{drift, in_place_count, rms_speed};
-use drystone::{BodyKind, Error, Reference, Result, Scene, Simulation, World};
+use drystone::{BodyKind, Error, Reference, Result, Simulation, World};
+use drystone_scenes::Scene;
 
 use super::plot::{Frame, Look, Scale, Series, svg};
 
@@ -51,7 +52,7 @@ pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
 /// All bodies fall at 1 mm/s at the start, so that none begins with the impulses that it rests with: rules differ in how a load comes on.
 fn simulate(mut world: World, settings_text: &str) -> Result<Simulation> {
     world.bodies.iter_mut().filter(|b| b.kind == BodyKind::Dynamic).for_each(|b| b.linear_velocity.y -= 1e-3);
-    Simulation::new(world, settings::awake(settings_text.split_whitespace())?, Box::new(Reference::<f32>::new()))
+    Simulation::with(world, settings::awake(settings_text.split_whitespace())?, Box::new(Reference::<f32>::new()))
 }
 
 struct Standing {

@@ -6,7 +6,8 @@ use super::{DT, RulesReport, Standing, simulate, stand};
 use crate::hard::energy;
 use crate::report::plot::Scale;
 use drystone::metrics::rms_speed;
-use drystone::{Body, Result, Scene, Shape, World};
+use drystone::{Body, Result, Shape, World};
+use drystone_scenes::Scene;
 use glam::Vec3;
 
 /// The settings of the course sheet: one substep, 20 sweeps, no soft contacts.

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::RunReport;
-use drystone::scenes::Spawners;
 use drystone::{BodyHandle, ColliderOf, Event, Simulation, World};
+use drystone_scenes::Spawners;
 
 /// How often bodies entered and left a sensor, and how many are inside.
 #[derive(Clone, Debug, Serialize)]

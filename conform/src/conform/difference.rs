@@ -1,0 +1,50 @@
+//! Differences between the rows that two backends return for one problem.
+
+use drystone::StepProblem;
+
+/// All numbers that a backend returns.
+fn numbers(problem: &StepProblem) -> Vec<f32> {
+    let c = &problem.convergence;
+    let m = &problem.momentum;
+    let rows: [&[f32]; 5] = [
+        bytemuck::cast_slice(&problem.bodies),
+        bytemuck::cast_slice(&problem.impulses),
+        bytemuck::cast_slice(&problem.totals),
+        bytemuck::cast_slice(&problem.joint_impulses),
+        bytemuck::cast_slice(&problem.joint_totals),
+    ];
+    let counts = [c.moving, c.done, c.sweeps, c.planned].map(|n| n as f32);
+    let momentum = [m.t, m.factor, m.square, m.restarts as f32];
+    [&rows.concat()[..], &counts, &momentum].concat()
+}
+
+/// The numbers of `a` with those of `b`.
+fn pairs(a: &StepProblem, b: &StepProblem) -> impl Iterator<Item = (f32, f32)> {
+    let (a, b) = (numbers(a), numbers(b));
+    assert_eq!(a.len(), b.len());
+    a.into_iter().zip(b)
+}
+
+/// Number of values that differ in any bit.
+pub fn differing(a: &StepProblem, b: &StepProblem) -> usize {
+    pairs(a, b).filter(|(x, y)| x.to_bits() != y.to_bits()).count()
+}
+
+/// The largest difference of two values, relative to 1 plus their size; infinite for NaN.
+pub fn largest(a: &StepProblem, b: &StepProblem) -> f64 {
+    let apart = |(x, y): (f32, f32)| {
+        let (x, y) = (f64::from(x), f64::from(y));
+        let d = (x - y).abs() / (1.0 + x.abs().max(y.abs()));
+        if d.is_nan() { f64::INFINITY } else { d }
+    };
+    pairs(a, b).map(apart).fold(0.0, f64::max)
+}
+
+/// The largest difference of a component of a velocity (m/s) or an angular velocity (rad/s).
+pub fn of_velocities(a: &StepProblem, b: &StepProblem) -> f64 {
+    assert_eq!(a.bodies.len(), b.bodies.len());
+    let velocities =
+        |problem: &StepProblem| -> Vec<f32> { problem.bodies.iter().flat_map(|row| [row.v, row.w].concat()).collect() };
+    let apart = |(x, y): (f32, f32)| if (x - y).is_nan() { f64::INFINITY } else { f64::from((x - y).abs()) };
+    velocities(a).into_iter().zip(velocities(b)).map(apart).fold(0.0, f64::max)
+}
