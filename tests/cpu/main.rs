@@ -28,6 +28,8 @@ mod laws_properties;
 mod allocations;
 mod batch;
 mod changes;
+#[cfg(feature = "gpu")]
+mod character;
 #[cfg(feature = "serde")]
 mod checked;
 mod compare;

@@ -8,3 +8,4 @@ mod scene_file;
 mod scene_file_joints;
 #[cfg(feature = "serde")]
 mod spawners;
+mod vehicle;
