@@ -35,9 +35,9 @@ pub fn run(mut print: impl FnMut(String)) -> Result<()> {
         let (speed, torque, angle) = match step {
             0..60 => (0.0, 300.0, 0.0),
             60..240 => (10.0, 300.0, 0.0),
-            // The wheels turn by 0.2 rad/s.
-            240..480 => (10.0, 300.0, (0.2 * (step - 240) as f32 / 60.0).min(0.25)),
-            _ => (0.0, 1000.0, 0.25),
+            // The wheels turn by 0.1 rad/s.
+            240..480 => (10.0, 300.0, (0.1 * (step - 240) as f32 / 60.0).min(0.15)),
+            _ => (0.0, 1000.0, 0.15),
         };
         simulation.world.joints.iter_mut().for_each(|joint| drive(joint, speed, torque, angle));
         simulation.step(scene.dt)?;

@@ -62,7 +62,9 @@ fn the_character_of_the_example_walks_the_course_to_the_steep_slope() {
     assert_eq!(lines.len(), 15);
     let on = |name: &str| lines.iter().any(|line| line.contains(&format!("on {name},")));
     assert!(["floor", "stair", "turntable"].into_iter().all(on) && !on("nothing"), "{lines:?}");
-    assert!(lines[14].contains("x 19.") && lines[14].contains("y 0.91"), "{lines:?}");
+    // A crate may lie between it and the slope.
+    let is_there = ["x 18.", "x 19."].into_iter().any(|place| lines[14].contains(place));
+    assert!(is_there && lines[14].contains("y 0.91"), "{lines:?}");
 }
 
 #[test]

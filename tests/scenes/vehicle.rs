@@ -137,9 +137,9 @@ fn a_character_walks_the_course() {
             highest = highest.max(place.y);
         }
         let place = simulation.world.bodies[own].position;
-        // Six stairs of 0.18 m. In the end it is at the foot of the slope of 50 degrees.
+        // Six stairs of 0.18 m. In the end it is at the foot of the slope of 50 degrees, or of a crate there.
         assert!((highest - 6.0 * 0.18 - 0.906).abs() < 0.01, "spin {spin}: {highest} m");
-        assert!(place.x > 19.0 && place.x < 20.0 && (place.y - 0.906).abs() < 0.01, "spin {spin}: {place}");
+        assert!(place.x > 18.5 && place.x < 20.0 && (place.y - 0.906).abs() < 0.01, "spin {spin}: {place}");
         assert_eq!(in_air, 0, "spin {spin}");
     }
 }
