@@ -26,6 +26,7 @@
 //! | go back, fork, save and load | [`Rollback`], [`Simulation::fork`], [`Simulation::snapshot`], [`Simulation::save`] |
 //! | read contacts and impulses | [`Simulation::manifolds`]: [`SolvedManifold`], [`SolvedPoint`] |
 //! | ask for bodies on a ray, at a point, in a box | [`Simulation::queries`], [`Queries`](queries::Queries) |
+//! | let a character walk | [`Character::walk`] |
 //! | get events of contacts, hits, sensors, broken joints | [`Simulation::events`], [`Listen`], [`Body::sensor`] |
 //! | measure overlap, speed, drift | [`metrics`] |
 //! | record a run and replay it | `drystone-scenes` |
@@ -45,6 +46,7 @@
 
 pub mod backend;
 pub mod batch;
+pub mod character;
 mod collide;
 pub mod config;
 mod effort;
@@ -77,6 +79,7 @@ pub use backend::Backend;
 pub use backend::cpu::{Cpu, Reference};
 #[cfg(feature = "gpu")]
 pub use backend::gpu::Gpu;
+pub use character::Character;
 pub use config::SolverConfig;
 pub use error::{Error, Result};
 pub use glam;

@@ -6,6 +6,7 @@
 //! pairs of a world do not depend on other worlds.
 
 mod ascent;
+mod clearance;
 mod collider;
 mod cone;
 mod cuboids;
@@ -34,6 +35,7 @@ mod testing;
 mod tree;
 mod world_contacts;
 
+pub(crate) use clearance::{Clearance, clearances};
 pub use collider::Activity;
 pub use detector::Detector;
 pub(crate) use detector::{ColliderSide, PairFilter};

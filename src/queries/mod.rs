@@ -7,7 +7,7 @@ mod shapes;
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 
-use crate::collide::{Detector, Place, Places};
+use crate::collide::{Clearance, Detector, Place, Places, clearances};
 use crate::math::rotation::squared_length;
 use crate::world::{BodyHandle, Collider, MOST_LENGTH, Shape, World, pose};
 use boxes::BoxRay;
@@ -187,6 +187,37 @@ impl<'a> Queries<'a> {
         found
     }
 
+    /// The contacts of a convex shape at a pose with all that is nearer than `within` (m), sorted by index: one contact
+    /// for each convex collider, and one for each triangle of a mesh or height field. A distance is negative for
+    /// overlap. The plane across the normal at that distance separates the two: a motion of the shape by x with
+    /// normal · x >= -distance does not make them overlap.
+    ///
+    /// ```
+    /// use drystone::{Body, Shape, World, glam::{Quat, Vec3}, queries::{Filter, Queries}};
+    ///
+    /// let mut world = World::new();
+    /// let floor = world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    /// let wall = world.insert(Body::fixed().shape(Shape::cuboid(0.5, 2.0, 2.0)).position(1.5, 2.0, 0.0));
+    /// let (ball, at) = (Shape::ball(0.5), Vec3::new(0.25, 0.75, 0.0));
+    /// let contacts = Queries::of(&world).contacts(&ball, at, Quat::IDENTITY, 1.0, &Filter::default());
+    /// let found: Vec<_> = contacts.iter().map(|hit| (hit.body, hit.distance, hit.normal)).collect();
+    /// assert_eq!(found, [(floor, 0.25, Vec3::Y), (wall, 0.25, Vec3::NEG_X)]);
+    /// ```
+    pub fn contacts(&self, shape: &Shape, position: Vec3, rotation: Quat, within: f32, filter: &Filter) -> Vec<Hit> {
+        let mut contacts = Vec::new();
+        if let Some((own, (lower, upper))) = placed(shape, position, rotation).filter(|_| within.is_finite()) {
+            let bounds = (lower - within, upper + within);
+            self.near(filter, bounds, |body, index, collider, pose| {
+                clearances((&collider.shape, &pose), (shape, &own), within, Vec3::ZERO, &mut |clearance| {
+                    let Clearance { normal, distance, point, .. } = clearance;
+                    contacts.push(Hit { body, collider: index, distance, point, normal });
+                });
+            });
+        }
+        contacts.sort_by_key(|hit| (hit.body, hit.collider));
+        contacts
+    }
+
     /// The first collider that a shape meets on its way from a pose along a direction, within the distance `most`. The
     /// shape does not rotate. A shape that overlaps a collider at the start meets it at distance 0.
     pub fn cast(
@@ -261,31 +292,47 @@ impl<'a> Queries<'a> {
     fn around(
         &self,
         filter: &Filter,
-        (lower, upper): (Vec3, Vec3),
+        bounds: (Vec3, Vec3),
         meets: impl Fn(&Collider, Pose) -> bool,
         found: &mut Vec<Found>,
     ) {
+        self.near(filter, bounds, |body, index, collider, pose| {
+            if meets(collider, pose) {
+                found.push((body, index));
+            }
+        });
+        found.sort_unstable();
+    }
+
+    /// Calls `visit` with each collider whose box overlaps a box: its body, its index there, and its pose. The order
+    /// depends on the tree.
+    pub(crate) fn near(
+        &self,
+        filter: &Filter,
+        (lower, upper): (Vec3, Vec3),
+        mut visit: impl FnMut(BodyHandle, usize, &Collider, Pose),
+    ) {
         let Some(part) = self.part(filter) else { return };
         let (lower, upper) = (lower.max(Vec3::splat(-8.0 * MOST_LENGTH)), upper.min(Vec3::splat(8.0 * MOST_LENGTH)));
-        let mut visit = |place: Place| {
-            let accepted = self.accepted(place, filter).filter(|(_, collider, pose)| meets(collider, *pose));
-            found.extend(accepted.map(|(body, ..)| (body, place.collider as usize)));
+        let mut tell = |place: Place| {
+            if let Some((body, collider, pose)) = self.accepted(place, filter) {
+                visit(body, place.collider as usize, collider, pose);
+            }
         };
         for &plane in &part.planes {
             let reaches = plane.find(self.world).is_some_and(|(c, pose)| boxes::reaches(&c.shape, &pose, lower, upper));
             if reaches {
-                visit(plane);
+                tell(plane);
             }
         }
         part.nearest(
             0.0,
             |mins, maxs| boxes::overlap(mins, maxs, lower, upper),
             |place, _| {
-                visit(place);
+                tell(place);
                 0.0
             },
         );
-        found.sort_unstable();
     }
 
     fn part(&self, filter: &Filter) -> Option<&Places> {

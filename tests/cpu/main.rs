@@ -24,6 +24,7 @@ mod laws_properties;
 mod allocations;
 mod batch;
 mod changes;
+mod character;
 mod checked;
 mod compare;
 mod contacts;

@@ -1,6 +1,9 @@
 //! Runs the examples that print what happens.
 
 #[allow(dead_code, reason = "the tests call run, and no main")]
+#[path = "../../examples/character.rs"]
+mod character;
+#[allow(dead_code, reason = "the tests call run, and no main")]
 #[path = "../../examples/one_way_platform.rs"]
 mod one_way_platform;
 #[allow(dead_code, reason = "the tests call run, and no main")]
@@ -12,6 +15,9 @@ mod server_loop;
 #[allow(dead_code, reason = "the tests call run, and no main")]
 #[path = "../../examples/spawn_and_remove.rs"]
 mod spawn_and_remove;
+#[allow(dead_code, reason = "the tests call run, and no main")]
+#[path = "../../examples/vehicle.rs"]
+mod vehicle;
 
 fn lines(run: impl FnOnce(&mut dyn FnMut(String)) -> drystone::Result<()>) -> Vec<String> {
     let mut lines = Vec::new();
@@ -58,4 +64,25 @@ fn the_server_sends_the_same_states_whatever_the_rounds() {
     assert!(all.iter().all(|line| line.matches("\"player\":").count() == 2));
     let players = |line: &str| line.split_once("players").map(|parts| parts.1.to_owned()).expect("players");
     assert!(all[..4].windows(2).all(|pair| players(&pair[0]) != players(&pair[1])), "nothing moves");
+}
+
+#[test]
+fn the_character_of_the_example_walks_the_course_to_the_steep_slope() {
+    let lines = lines(|print| character::run(print));
+    assert_eq!(lines.len(), 15);
+    let on = |name: &str| lines.iter().any(|line| line.contains(&format!("on {name},")));
+    assert!(["floor", "stair", "turntable"].into_iter().all(on) && !on("nothing"), "{lines:?}");
+    // A crate may lie between it and the slope.
+    let is_there = ["x 18.", "x 19."].into_iter().any(|place| lines[14].contains(place));
+    assert!(is_there && lines[14].contains("y 0.91"), "{lines:?}");
+}
+
+#[test]
+fn the_vehicle_of_the_example_drives_and_stops() {
+    let lines = lines(|print| vehicle::run(print));
+    assert_eq!(lines.len(), 10);
+    let speed =
+        |line: &String| line.split(" m, ").nth(1).and_then(|rest| rest.split(" m/s").next()?.trim().parse().ok());
+    let speeds: Vec<f32> = lines.iter().filter_map(speed).collect();
+    assert!(speeds.len() == 10 && speeds[0] < 0.2 && speeds[6] > 8.0 && speeds[9] < 0.2, "{lines:?}");
 }

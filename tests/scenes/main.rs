@@ -6,3 +6,4 @@ mod presets;
 mod scene_file;
 mod scene_file_joints;
 mod spawners;
+mod vehicle;

@@ -3,6 +3,7 @@
 mod basics;
 mod boxes;
 mod common;
+mod course;
 mod drop;
 mod drum;
 mod entry;
@@ -13,6 +14,7 @@ mod jointed;
 mod machines;
 mod masonry;
 mod stacks;
+mod vehicle;
 
 pub use entry::{Entry, MOST_BODIES, Parameter};
 pub use families::{Family, Law, Member};
@@ -275,6 +277,31 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| if v[1] > 0.0 { 9.0 } else { 5.0 },
         build: |v| Ok(machines::car(v[0] as f32, v[1] as f32)),
+    },
+    Entry {
+        name: "vehicle",
+        summary: "a vehicle with four sprung and driven wheels drives a circle over hills: it stays upright",
+        parameters: &[
+            Parameter::real("speed", 6.0, (0.0, 30.0), "speed that its motors turn the wheels for [m/s]"),
+            Parameter::real(
+                "steering",
+                10.0,
+                (-35.0, 35.0),
+                "angle of the front wheels, positive to the left [degrees]",
+            ),
+            Parameter::real("hills", 1.0, (0.0, 5.0), "height of the hills [m]"),
+            Parameter::real("load", 0.0, (0.0, 1200.0), "mass that it carries [kg]"),
+            Parameter::real("mu", 1.0, (0.0, 10.0), "friction of the wheels and the ground"),
+        ],
+        bodies: |_| 5.0,
+        build: |v| vehicle::vehicle(v[0] as f32, v[1] as f32, v[2] as f32, v[3] as f32, v[4] as f32),
+    },
+    Entry {
+        name: "course",
+        summary: "stairs, a ramp, a turntable, crates and a steep slope: a character walks from one end to the other",
+        parameters: &[Parameter::real("spin", 0.5, (-3.0, 3.0), "angular speed of the turntable [rad/s]")],
+        bodies: |_| 3.0,
+        build: |v| Ok(course::course(v[0] as f32)),
     },
     Entry {
         name: "ragdoll",
