@@ -32,10 +32,10 @@ fn stages(c: &mut Criterion) {
     group.throughput(Throughput::Elements(simulation.next_problem(dt).expect("a step").0.contacts.len() as u64));
 
     let mut detector = Detector::new(&world);
-    detector.detect(&world, &config, dt, &[]);
-    group.bench_function("detect, reused", |b| b.iter(|| detector.detect(&world, &config, dt, &[])));
+    detector.detect(&world, &config, dt, &[], None);
+    group.bench_function("detect, reused", |b| b.iter(|| detector.detect(&world, &config, dt, &[], None)));
     let mut fresh = Detector::new(&world);
-    group.bench_function("detect, computed", |b| b.iter(|| fresh.detect(&world, &anew, dt, &[])));
+    group.bench_function("detect, computed", |b| b.iter(|| fresh.detect(&world, &anew, dt, &[], None)));
 
     let movable = |body: u32| if world.bodies[body as usize].kind == BodyKind::Dynamic { body } else { IMMOVABLE };
     let touching = detector.pairs().filter(|p| p.is_touching());
@@ -55,7 +55,7 @@ fn stages(c: &mut Criterion) {
     let mut problem = StepProblem::default();
     let mut contacts = ContactRows::default();
     let effort = Effort::default();
-    begin(&world, &[], &config, &effort, &mut problem);
+    begin(&world, &[], &config, &mut problem);
     contacts.follow(&world, &mut detector);
     contacts.color(&world, config.max_colors);
     group.bench_function("rows, written again", |b| {

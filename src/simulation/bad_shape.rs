@@ -6,8 +6,6 @@ use parry3d::mass_properties::MassProperties;
 use parry3d::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
 use parry3d::shape::{Ball, FeatureId, Shape, ShapeType, SharedShape, SupportMap, TypedShape};
 
-use crate::backend::cpu::Cpu;
-use crate::config::SolverConfig;
 use crate::error::{Error, Result};
 use crate::simulation::{Event, Listen, Simulation};
 use crate::stats::StepStats;
