@@ -3,9 +3,9 @@
 // No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
 // Double: src/kernels/contact.rs.
 
-fn bounce(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, point: Point, impulse: Impulse) -> Wanted {
+fn bounce(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, impulse: Impulse) -> Wanted {
     let bounces = -params.restitution_threshold > point.approach_velocity && impulse.peak > 0.0;
-    let vn = framed_velocity(rules, framed, point.r_a, point.r_b).z;
+    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let lacking = -(vn + contact.restitution * point.approach_velocity);
     let sum = larger(impulse.normal + point.normal_mass * lacking, 0.0);
     return Wanted(select(impulse.normal, sum, bounces), lacking);
@@ -14,24 +14,22 @@ fn bounce(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, poi
 fn restitute_contact(rules: Rules, i: u32) {
     let contact = contacts[i];
     var pair = load_pair(contact.body_a, contact.body_b);
-    var framed = framed_pair(rules, &pair, contact);
     var together = Together();
     for (var k = 0u; k < contact.point_count; k++) {
-        let point = framed_point(framed.frame, points[contact.first_point + k]);
+        let point = points[contact.first_point + k];
         let impulse = impulses[contact.first_point + k];
-        add_point(&together, k, point, impulse.normal, bounce(rules, &framed, contact, point, impulse));
+        add_point(&together, k, point, impulse.normal, bounce(rules, &pair, contact, point, impulse));
     }
-    press_as_one(rules, &framed, contact, &together);
+    press_as_one(rules, &pair, contact, &together);
     for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {
-        let point = framed_point(framed.frame, points[k]);
+        let point = points[k];
         var impulse = impulses[k];
-        let sum = bounce(rules, &framed, contact, point, impulse).sum;
+        let sum = bounce(rules, &pair, contact, point, impulse).sum;
         let change = sum - impulse.normal;
         impulse.normal = sum;
         impulse.peak = larger(impulse.peak, impulse.normal);
         impulses[k] = impulse;
-        press(rules.isotropic, &framed, point.r_a, point.r_b, change);
+        apply_impulse(rules.isotropic, &pair, point.r_a, point.r_b, contact.normal * change);
     }
-    change_pair(rules, &framed, &pair);
     store_pair(contact.body_a, contact.body_b, &pair);
 }

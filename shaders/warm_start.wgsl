@@ -5,23 +5,24 @@
 
 fn warm_start_contact(rules: Rules, i: u32) {
     let contact = contacts[i];
+    let tangent_2 = cross3(contact.normal, contact.tangent);
     let end = contact.first_point + contact.point_count;
     var pair = load_pair(contact.body_a, contact.body_b);
-    var framed = framed_pair(rules, &pair, contact);
     for (var k = contact.first_point; k < end; k++) {
-        let point = framed_point(framed.frame, points[k]);
         let impulse = impulses[k];
-        press(rules.isotropic, &framed, point.r_a, point.r_b, impulse.normal);
+        var p = contact.normal * impulse.normal;
         if rules.friction != FRICTION_NONE && !rules.at_patch {
-            rub(rules.isotropic, &framed, point.r_a, point.r_b, impulse.tangent_1, impulse.tangent_2);
+            p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
+        apply_impulse(rules.isotropic, &pair, points[k].r_a, points[k].r_b, p);
     }
     if rules.friction != FRICTION_NONE && rules.at_patch {
-        let patch_point = framed_point(framed.frame, points[end]);
         let impulse = impulses[end];
-        twist(rules.isotropic, &framed, impulse.normal);
-        rub(rules.isotropic, &framed, patch_point.r_a, patch_point.r_b, impulse.tangent_1, impulse.tangent_2);
+        let twist = contact.normal * impulse.normal;
+        pair.a.w -= spin_of(rules.isotropic, pair.mass_a, twist);
+        pair.b.w += spin_of(rules.isotropic, pair.mass_b, twist);
+        let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+        apply_impulse(rules.isotropic, &pair, points[end].r_a, points[end].r_b, p);
     }
-    change_pair(rules, &framed, &pair);
     store_pair(contact.body_a, contact.body_b, &pair);
 }

@@ -14,11 +14,6 @@ fn normal_movement(rules: Rules, pair: ptr<function, Pair>, contact: Contact) ->
     return NormalMovement(shift, turn_a, turn_b);
 }
 
-// The same for arms in the frame of the contact.
-fn framed_movement(frame: Frame, movement: NormalMovement) -> NormalMovement {
-    return NormalMovement(movement.shift, components(frame, movement.turn_a), components(frame, movement.turn_b));
-}
-
 // The separation that the solver uses: the separation at the begin of the step, less the preload, plus the movement since.
 fn current_separation(movement: NormalMovement, contact: Contact, point: Point) -> f32 {
     return (point.separation - contact.preload) + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
@@ -36,7 +31,7 @@ fn clamp_normal(rules: Rules, sum: f32, correction: f32) -> f32 {
 }
 
 // The change of the normal impulse that a point asks for by itself.
-fn normal_correction(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: f32) -> f32 {
+fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: f32) -> f32 {
     let s = current_separation(movement, contact, point);
     // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
     let apart = s > 0.0;
@@ -44,7 +39,7 @@ fn normal_correction(rules: Rules, framed: ptr<function, FramedPair>, contact: C
     let bias = select(select(0.0, pushed, rules.biased), s * pass_row.inverse_substep, apart);
     let mass_scale = select(select(1.0, softness.mass_scale, rules.biased), 1.0, apart);
     let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
-    let vn = framed_velocity(rules, framed, point.r_a, point.r_b).z;
+    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
     let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
@@ -52,14 +47,14 @@ fn normal_correction(rules: Rules, framed: ptr<function, FramedPair>, contact: C
     return params.relaxation * correction;
 }
 
-fn solve_normal(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
-    let correction = normal_correction(rules, framed, contact, point, softness, movement, (*impulse).normal);
+fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
+    let correction = normal_correction(rules, pair, contact, point, softness, movement, (*impulse).normal);
     let sum = clamp_normal(rules, (*impulse).normal, correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;
     if rules.bounces { (*impulse).peak = larger((*impulse).peak, sum); }
     note_correction(rules.measured, change, point.normal_mass);
-    press(rules.isotropic, framed, point.r_a, point.r_b, change);
+    apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.normal * change);
 }
 
 // The impulse that a point would have by itself, and the normal velocity that it lacks.
@@ -85,24 +80,21 @@ fn add_point(together: ptr<function, Together>, k: u32, point: Point, impulse: f
     (*together).mass = (*together).mass + point.normal_mass;
 }
 
-// The moment of an impulse of 1 along the normal at the arm r.
-fn moment_of_normal(r: vec3f) -> vec3f { return vec3f(r.y, -r.x, 0.0); }
-
 // Changes the impulses of all points of a manifold together, by the share of what each would change by itself that leaves the least energy of
 // what they lack: steepest descent.
-fn press_as_one(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, together: ptr<function, Together>) {
-    let turn_a = moment_of_normal((*together).arms_a);
-    let turn_b = moment_of_normal((*together).arms_b);
-    let spin_a = spin_of(rules.isotropic, (*framed).mass_a, turn_a);
-    let spin_b = spin_of(rules.isotropic, (*framed).mass_b, turn_b);
+fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, together: ptr<function, Together>) {
+    let turn_a = cross3((*together).arms_a, contact.normal);
+    let turn_b = cross3((*together).arms_b, contact.normal);
+    let spin_a = spin_of(rules.isotropic, (*pair).mass_a, turn_a);
+    let spin_b = spin_of(rules.isotropic, (*pair).mass_b, turn_b);
     let turned = dot3(turn_a, spin_a) + dot3(turn_b, spin_b);
     let all = (*together).all;
-    let moved = (all * all) * (*framed).inv_mass + turned;
+    let moved = (all * all) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turned;
     let inverse = reciprocal(larger((*together).count, 1.0));
-    let about_a = moment_of_normal((*together).middle_a * inverse);
-    let about_b = moment_of_normal((*together).middle_b * inverse);
-    let turning = dot3(about_a, spin_of(rules.isotropic, (*framed).mass_a, about_a)) + dot3(about_b, spin_of(rules.isotropic, (*framed).mass_b, about_b));
-    let alike = reciprocal((*together).mass * ((*framed).inv_mass + turning));
+    let about_a = cross3((*together).middle_a * inverse, contact.normal);
+    let about_b = cross3((*together).middle_b * inverse, contact.normal);
+    let turning = dot3(about_a, spin_of(rules.isotropic, (*pair).mass_a, about_a)) + dot3(about_b, spin_of(rules.isotropic, (*pair).mass_b, about_b));
+    let alike = reciprocal((*together).mass * (((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turning));
     let best = smaller((*together).gain * reciprocal(moved), larger(alike, 1.0));
     let share = select(0.0, best, (*together).count > 1.0 && (*together).gain > 0.0);
     for (var k = 0u; k < contact.point_count; k++) {
@@ -111,22 +103,22 @@ fn press_as_one(rules: Rules, framed: ptr<function, FramedPair>, contact: Contac
         if rules.bounces { impulse.peak = larger(impulse.peak, impulse.normal); }
         impulses[contact.first_point + k] = impulse;
     }
-    let push = share * all;
-    (*framed).impulse.z = (*framed).impulse.z + push;
-    (*framed).motion.u.z = (*framed).motion.u.z + push * (*framed).inv_mass;
-    (*framed).motion.w_a -= spin_a * share;
-    (*framed).motion.w_b += spin_b * share;
+    let push = contact.normal * (share * all);
+    (*pair).a.v -= push * (*pair).mass_a.inv_mass;
+    (*pair).a.w -= spin_a * share;
+    (*pair).b.v += push * (*pair).mass_b.inv_mass;
+    (*pair).b.w += spin_b * share;
 }
 
 // Non-penetration of all points together, before each is solved by itself.
-fn solve_as_one(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, softness: Softness, movement: NormalMovement) {
+fn solve_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, softness: Softness, movement: NormalMovement) {
     var together = Together();
     for (var k = 0u; k < contact.point_count; k++) {
-        let point = framed_point((*framed).frame, points[contact.first_point + k]);
+        let point = points[contact.first_point + k];
         let impulse = impulses[contact.first_point + k].normal;
-        let correction = normal_correction(rules, framed, contact, point, softness, movement, impulse);
+        let correction = normal_correction(rules, pair, contact, point, softness, movement, impulse);
         let lacking = select(0.0, correction * reciprocal(point.normal_mass), point.normal_mass > 0.0);
         add_point(&together, k, point, impulse, Wanted(clamp_normal(rules, impulse, correction), lacking));
     }
-    press_as_one(rules, framed, contact, &together);
+    press_as_one(rules, pair, contact, &together);
 }

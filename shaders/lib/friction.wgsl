@@ -13,10 +13,11 @@ fn allowed_friction(friction: u32, y: vec2f, limit: f32) -> vec2f {
 
 // Coulomb friction: the sum of the tangential impulses stays within what the normal impulse allows. The step along both
 // tangents has one length: with a matrix step the clamped point would slip in a wrong direction.
-fn solve_friction(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, point: Point, normal_impulse: f32, impulse: ptr<function, Impulse>) {
-    let u = framed_velocity(rules, framed, point.r_a, point.r_b);
-    var u_1 = u.x;
-    var u_2 = u.y;
+fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, normal_impulse: f32, impulse: ptr<function, Impulse>) {
+    let tangent_2 = cross3(contact.normal, contact.tangent);
+    let u = relative_velocity(rules, pair, point.r_a, point.r_b);
+    var u_1 = dot3(u, contact.tangent);
+    var u_2 = dot3(u, tangent_2);
     if rules.driven {
         u_1 += point.slip_1;
         u_2 += point.slip_2;
@@ -38,16 +39,18 @@ fn solve_friction(rules: Rules, framed: ptr<function, FramedPair>, contact: Cont
     (*impulse).tangent_2 = sum.y;
     note_correction(rules.measured, change_1, point.tangent_mass);
     note_correction(rules.measured, change_2, point.tangent_mass);
-    rub(rules.isotropic, framed, point.r_a, point.r_b, change_1, change_2);
+    apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
 }
 
 // Spin about the normal, limited by the normal impulses times their distance from the middle.
-fn solve_twist(rules: Rules, framed: ptr<function, FramedPair>, contact: Contact, patch_point: Point, lever: f32, impulse: ptr<function, Impulse>) {
-    var spin = (*framed).motion.w_b.z - (*framed).motion.w_a.z;
-    if rules.from_start { spin = spin + ((*framed).start.w_b.z - (*framed).start.w_a.z); }
+fn solve_twist(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_point: Point, lever: f32, impulse: ptr<function, Impulse>) {
+    var w = (*pair).b.w - (*pair).a.w;
+    if rules.from_start { w = w + ((*pair).start_b.w - (*pair).start_a.w); }
+    let spin = dot3(w, contact.normal);
     let mass = params.relaxation * patch_point.normal_mass;
     let sum = clamp_abs((*impulse).normal - mass * spin, contact.friction * lever);
-    let change = sum - (*impulse).normal;
+    let change = contact.normal * (sum - (*impulse).normal);
     (*impulse).normal = sum;
-    twist(rules.isotropic, framed, change);
+    (*pair).a.w -= spin_of(rules.isotropic, (*pair).mass_a, change);
+    (*pair).b.w += spin_of(rules.isotropic, (*pair).mass_b, change);
 }

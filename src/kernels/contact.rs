@@ -5,20 +5,19 @@
 //! the lanes of fuller ones. With friction per manifold the last of the rows is the patch.
 
 use super::Rules;
-use super::frame::{Frame, FramedPair};
 use super::friction::{solve_friction, solve_twist};
-use super::pair::{note_correction, spin_of};
+use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
-use crate::math::{Lane, NormalMovement, Vec3, dot3, larger, reciprocal, smaller, vec3};
+use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, reciprocal, smaller};
 
 /// The points of a manifold and their impulses, wherever they stand.
 pub trait PointRows<L> {
     /// How many there are, the patch included.
     fn count(&self) -> usize;
-    /// The point `k`, with arms in the frame of its manifold.
-    fn point(&self, k: usize, frame: &Frame<L>) -> Point<L>;
+    /// The point `k`.
+    fn point(&self, k: usize) -> Point<L>;
     /// The impulse of the point `k`.
     fn impulse(&self, k: usize) -> Impulse<L>;
     /// Changes the normal impulse of a point.
@@ -33,8 +32,8 @@ impl<L: Lane> PointRows<L> for (&[Point<L>], &mut [Impulse<L>]) {
     fn count(&self) -> usize {
         self.0.len()
     }
-    fn point(&self, k: usize, frame: &Frame<L>) -> Point<L> {
-        frame.point(&self.0[k])
+    fn point(&self, k: usize) -> Point<L> {
+        self.0[k]
     }
     fn impulse(&self, k: usize) -> Impulse<L> {
         self.1[k]
@@ -86,7 +85,6 @@ fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
 /// The values that the points of a manifold share in a sweep.
 struct Common<L> {
     softness: SoftnessOf<L>,
-    /// For arms in the frame of the manifold.
     movement: NormalMovement<L>,
 }
 
@@ -100,7 +98,7 @@ fn normal_correction<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
     Common { softness, movement }: &Common<L>,
-    framed: &FramedPair<L>,
+    pair: &Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
     impulse: L,
@@ -113,7 +111,7 @@ fn normal_correction<L: Lane>(
     let bias = L::select(if rules.biased { pushed } else { zero }, s * params.inverse_substep, apart);
     let mass_scale = L::select(if rules.biased { softness.mass_scale } else { one }, one, apart);
     let impulse_scale = L::select(if rules.biased { softness.impulse_scale } else { zero }, zero, apart);
-    let vn = framed.relative_velocity(rules, point.r_a, point.r_b).z;
+    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
     let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
     // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
@@ -127,12 +125,12 @@ fn solve_normal<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
     common: &Common<L>,
-    (pair, framed): (&mut Pair<L>, &mut FramedPair<L>),
+    pair: &mut Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
     impulse: &mut Impulse<L>,
 ) {
-    let correction = normal_correction(rules, params, common, framed, contact, point, impulse.normal);
+    let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
     let sum = clamp_normal(rules, impulse.normal, correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
@@ -140,7 +138,7 @@ fn solve_normal<L: Lane>(
         impulse.peak = larger(impulse.peak, sum);
     }
     note_correction(rules, params, pair, change, point.normal_mass);
-    framed.press(rules, point.r_a, point.r_b, change);
+    apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
 }
 
 /// Changes the impulses of all points of a manifold together, by the share of what each would change by itself that leaves the least energy of what
@@ -150,9 +148,10 @@ fn solve_normal<L: Lane>(
 #[inline(always)]
 fn press_as_one<L: Lane>(
     rules: Rules,
-    framed: &mut FramedPair<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
     rows: &mut impl PointRows<L>,
-    wanted: impl Fn(&FramedPair<L>, &Point<L>, &Impulse<L>) -> (L, L),
+    wanted: impl Fn(&Pair<L>, &Point<L>, &Impulse<L>) -> (L, L),
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let mut changes = [zero; MAX_POINTS];
@@ -160,9 +159,9 @@ fn press_as_one<L: Lane>(
     let (mut count, mut all, mut gain, mut mass) = (zero, zero, zero, zero);
     let (mut middle_a, mut middle_b) = (Vec3::default(), Vec3::default());
     for (k, own) in changes.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
-        let point = rows.point(k, &framed.frame);
+        let point = rows.point(k);
         let impulse = rows.impulse(k);
-        let (sum, lacking) = wanted(framed, &point, &impulse);
+        let (sum, lacking) = wanted(pair, &point, &impulse);
         let change = sum - impulse.normal;
         *own = change;
         arms_a += point.r_a * change;
@@ -175,16 +174,17 @@ fn press_as_one<L: Lane>(
         count = count + share;
         mass = mass + point.normal_mass;
     }
-    let (turn_a, turn_b) = (moment_of_normal(arms_a), moment_of_normal(arms_b));
-    let (spin_a, spin_b) = (spin_of(rules, framed.inv_inertia_a, turn_a), spin_of(rules, framed.inv_inertia_b, turn_b));
+    let (turn_a, turn_b) = (cross3(arms_a, contact.normal), cross3(arms_b, contact.normal));
+    let (spin_a, spin_b) =
+        (spin_of(rules, pair.mass_a.inv_inertia, turn_a), spin_of(rules, pair.mass_b.inv_inertia, turn_b));
     let turned = dot3(turn_a, spin_a) + dot3(turn_b, spin_b);
-    let moved = (all * all) * framed.inv_mass + turned;
+    let moved = (all * all) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turned;
     // The share of points that lack the same is the most: what differs from point to point is left to the sweep.
     let inverse = reciprocal(larger(count, one));
-    let (about_a, about_b) = (moment_of_normal(middle_a * inverse), moment_of_normal(middle_b * inverse));
-    let turning = dot3(about_a, spin_of(rules, framed.inv_inertia_a, about_a))
-        + dot3(about_b, spin_of(rules, framed.inv_inertia_b, about_b));
-    let alike = reciprocal(mass * (framed.inv_mass + turning));
+    let (about_a, about_b) = (cross3(middle_a * inverse, contact.normal), cross3(middle_b * inverse, contact.normal));
+    let turning = dot3(about_a, spin_of(rules, pair.mass_a.inv_inertia, about_a))
+        + dot3(about_b, spin_of(rules, pair.mass_b.inv_inertia, about_b));
+    let alike = reciprocal(mass * ((pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning));
     let best = smaller(gain * reciprocal(moved), larger(alike, one));
     let share = L::select(zero, best, L::and(count.gt(one), gain.gt(zero)));
     for (k, &change) in changes.iter().enumerate().take(rules.contact_points(rows.count())) {
@@ -195,17 +195,11 @@ fn press_as_one<L: Lane>(
             rows.set_peak(k, larger(impulse.peak, sum));
         }
     }
-    let push = share * all;
-    framed.impulse.z = framed.impulse.z + push;
-    framed.motion.u.z = framed.motion.u.z + push * framed.inv_mass;
-    framed.motion.w_a -= spin_a * share;
-    framed.motion.w_b += spin_b * share;
-}
-
-/// The moment of an impulse of 1 along the normal at the arm r.
-#[inline(always)]
-fn moment_of_normal<L: Lane>(r: Vec3<L>) -> Vec3<L> {
-    vec3(r.y, -r.x, L::constant(0.0))
+    let push = contact.normal * (share * all);
+    pair.a.v -= push * pair.mass_a.inv_mass;
+    pair.a.w -= spin_a * share;
+    pair.b.v += push * pair.mass_b.inv_mass;
+    pair.b.w += spin_b * share;
 }
 
 /// What a point lacks to change its impulse by `correction` without a bound; nothing where it has no mass.
@@ -222,12 +216,12 @@ fn solve_as_one<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
     common: &Common<L>,
-    framed: &mut FramedPair<L>,
+    pair: &mut Pair<L>,
     contact: &Contact<L>,
     rows: &mut impl PointRows<L>,
 ) {
-    press_as_one(rules, framed, rows, |framed, point, impulse| {
-        let correction = normal_correction(rules, params, common, framed, contact, point, impulse.normal);
+    press_as_one(rules, pair, contact, rows, |pair, point, impulse| {
+        let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
         (clamp_normal(rules, impulse.normal, correction), lacking(point, correction))
     });
 }
@@ -254,21 +248,24 @@ pub fn summed<L: Lane>(is_first: bool, before: Vec3<L>, now: Vec3<L>) -> Vec3<L>
 /// Applies the impulses that a manifold already carries. Kernel `warm_start`.
 #[inline(always)]
 pub fn warm_start<L: Lane>(rules: Rules, pair: &mut Pair<L>, contact: &Contact<L>, rows: &impl PointRows<L>) {
-    let mut framed = FramedPair::new(rules, pair, Frame::of(contact));
+    let tangent_2 = cross3(contact.normal, contact.tangent);
     let end = rules.contact_points(rows.count());
     for k in 0..end {
-        let (point, impulse) = (rows.point(k, &framed.frame), rows.impulse(k));
-        framed.press(rules, point.r_a, point.r_b, impulse.normal);
+        let (point, impulse) = (rows.point(k), rows.impulse(k));
+        let mut p = contact.normal * impulse.normal;
         if rules.friction != FrictionRule::None && !rules.patch {
-            framed.rub(rules, point.r_a, point.r_b, impulse.tangent_1, impulse.tangent_2);
+            p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
+        apply_impulse(rules, pair, point.r_a, point.r_b, p);
     }
     if rules.friction != FrictionRule::None && rules.patch {
-        let (patch, impulse) = (rows.point(end, &framed.frame), rows.impulse(end));
-        framed.twist(rules, impulse.normal);
-        framed.rub(rules, patch.r_a, patch.r_b, impulse.tangent_1, impulse.tangent_2);
+        let (patch, impulse) = (rows.point(end), rows.impulse(end));
+        let twist = contact.normal * impulse.normal;
+        pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, twist);
+        pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, twist);
+        let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
+        apply_impulse(rules, pair, patch.r_a, patch.r_b, p);
     }
-    framed.change(rules, pair);
 }
 
 /// Sweeps one manifold. Kernel `solve_contacts`.
@@ -281,36 +278,33 @@ pub fn solve_contact<L: Lane>(
     rows: &mut impl PointRows<L>,
 ) {
     let has_friction = rules.friction != FrictionRule::None;
-    let mut framed = FramedPair::new(rules, pair, Frame::of(contact));
-    let movement = framed.frame.movement(normal_movement(rules, pair, contact));
-    let common = Common { softness: pair_softness(params, pair), movement };
+    let common = Common { softness: pair_softness(params, pair), movement: normal_movement(rules, pair, contact) };
     for _ in 0..rules.passes {
         if has_friction && rules.friction_first {
-            sweep_friction(rules, params, (pair, &mut framed), contact, rows);
+            sweep_friction(rules, params, pair, contact, rows);
         }
         if rules.as_one {
-            solve_as_one(rules, params, &common, &mut framed, contact, rows);
+            solve_as_one(rules, params, &common, pair, contact, rows);
         }
         for k in 0..rules.contact_points(rows.count()) {
-            let (point, mut impulse) = (rows.point(k, &framed.frame), rows.impulse(k));
-            solve_normal(rules, params, &common, (pair, &mut framed), contact, &point, &mut impulse);
+            let mut impulse = rows.impulse(k);
+            solve_normal(rules, params, &common, pair, contact, &rows.point(k), &mut impulse);
             rows.set_normal(k, impulse.normal);
             if rules.bounces {
                 rows.set_peak(k, impulse.peak);
             }
         }
         if has_friction && !rules.friction_first {
-            sweep_friction(rules, params, (pair, &mut framed), contact, rows);
+            sweep_friction(rules, params, pair, contact, rows);
         }
     }
-    framed.change(rules, pair);
 }
 
 #[inline(always)]
 fn sweep_friction<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
-    (pair, framed): (&mut Pair<L>, &mut FramedPair<L>),
+    pair: &mut Pair<L>,
     contact: &Contact<L>,
     rows: &mut impl PointRows<L>,
 ) {
@@ -320,18 +314,17 @@ fn sweep_friction<L: Lane>(
         for k in 0..end {
             let normal = rows.impulse(k).normal;
             pressed = pressed + normal;
-            lever = lever + normal * rows.point(k, &framed.frame).slip_1;
+            lever = lever + normal * rows.point(k).slip_1;
         }
-        let (patch, mut impulse) = (rows.point(end, &framed.frame), rows.impulse(end));
-        solve_twist(rules, params, framed, contact, &patch, lever, &mut impulse);
-        solve_friction(rules, params, (pair, framed), contact, &patch, pressed, &mut impulse);
+        let (patch, mut impulse) = (rows.point(end), rows.impulse(end));
+        solve_twist(rules, params, pair, contact, &patch, lever, &mut impulse);
+        solve_friction(rules, params, pair, contact, &patch, pressed, &mut impulse);
         rows.set_normal(end, impulse.normal);
         rows.set_friction(end, impulse.tangent_1, impulse.tangent_2);
     } else {
         for k in 0..end {
-            let (point, mut impulse) = (rows.point(k, &framed.frame), rows.impulse(k));
-            let pressed = impulse.normal;
-            solve_friction(rules, params, (&mut *pair, &mut *framed), contact, &point, pressed, &mut impulse);
+            let mut impulse = rows.impulse(k);
+            solve_friction(rules, params, pair, contact, &rows.point(k), impulse.normal, &mut impulse);
             rows.set_friction(k, impulse.tangent_1, impulse.tangent_2);
         }
     }
@@ -347,22 +340,20 @@ pub fn restitute_contact<L: Lane>(
     rows: &mut impl PointRows<L>,
 ) {
     let zero = L::constant(0.0);
-    let bounce = |framed: &FramedPair<L>, point: &Point<L>, impulse: &Impulse<L>| {
+    let bounce = |pair: &Pair<L>, point: &Point<L>, impulse: &Impulse<L>| {
         let hit = (-params.restitution_threshold).gt(point.approach_velocity);
-        let vn = framed.relative_velocity(rules, point.r_a, point.r_b).z;
+        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
         let lacking = -(vn + contact.restitution * point.approach_velocity);
         let sum = larger(impulse.normal + point.normal_mass * lacking, zero);
         (L::select(impulse.normal, sum, L::and(hit, impulse.peak.gt(zero))), lacking)
     };
-    let mut framed = FramedPair::new(rules, pair, Frame::of(contact));
-    press_as_one(rules, &mut framed, rows, bounce);
+    press_as_one(rules, pair, contact, rows, bounce);
     for k in 0..rules.contact_points(rows.count()) {
-        let (point, impulse) = (rows.point(k, &framed.frame), rows.impulse(k));
-        let (sum, _) = bounce(&framed, &point, &impulse);
+        let (point, impulse) = (rows.point(k), rows.impulse(k));
+        let (sum, _) = bounce(pair, &point, &impulse);
         let change = sum - impulse.normal;
         rows.set_normal(k, sum);
         rows.set_peak(k, larger(impulse.peak, sum));
-        framed.press(rules, point.r_a, point.r_b, change);
+        apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
     }
-    framed.change(rules, pair);
 }

@@ -1,11 +1,10 @@
 //! Friction at one point or over one manifold. Doubles of `shaders/lib/friction.wgsl`.
 
 use super::Rules;
-use super::frame::FramedPair;
-use super::pair::note_correction;
+use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, StepParams};
 use crate::config::FrictionRule;
-use crate::math::{Lane, Vec3, larger, smaller};
+use crate::math::{Lane, cross3, dot3, larger, smaller};
 
 /// x, no further from 0 than the limit.
 #[inline(always)]
@@ -33,13 +32,16 @@ pub fn allowed_friction<L: Lane>(rule: FrictionRule, y: [L; 2], limit: L) -> [L;
 pub fn solve_friction<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
-    (pair, framed): (&mut Pair<L>, &mut FramedPair<L>),
+    pair: &mut Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
     normal_impulse: L,
     impulse: &mut Impulse<L>,
 ) {
-    let Vec3 { x: mut u_1, y: mut u_2, .. } = framed.relative_velocity(rules, point.r_a, point.r_b);
+    let tangent_2 = cross3(contact.normal, contact.tangent);
+    let u = relative_velocity(rules, pair, point.r_a, point.r_b);
+    let mut u_1 = dot3(u, contact.tangent);
+    let mut u_2 = dot3(u, tangent_2);
     if rules.driven {
         u_1 = u_1 + point.slip_1;
         u_2 = u_2 + point.slip_2;
@@ -60,7 +62,7 @@ pub fn solve_friction<L: Lane>(
     impulse.tangent_2 = sum[1];
     note_correction(rules, params, pair, change_1, point.tangent_mass);
     note_correction(rules, params, pair, change_2, point.tangent_mass);
-    framed.rub(rules, point.r_a, point.r_b, change_1, change_2);
+    apply_impulse(rules, pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
 }
 
 /// Spin about the normal, limited by the normal impulses times their distance from the middle.
@@ -68,19 +70,21 @@ pub fn solve_friction<L: Lane>(
 pub fn solve_twist<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
-    framed: &mut FramedPair<L>,
+    pair: &mut Pair<L>,
     contact: &Contact<L>,
     patch: &Point<L>,
     lever: L,
     impulse: &mut Impulse<L>,
 ) {
-    let mut spin = framed.motion.w_b.z - framed.motion.w_a.z;
+    let mut w = pair.b.w - pair.a.w;
     if rules.from_start {
-        spin = spin + (framed.start.w_b.z - framed.start.w_a.z);
+        w += pair.start_b.w - pair.start_a.w;
     }
+    let spin = dot3(w, contact.normal);
     let mass = params.relaxation * patch.normal_mass;
     let sum = clamp_abs(impulse.normal - mass * spin, contact.friction * lever);
-    let change = sum - impulse.normal;
+    let change = contact.normal * (sum - impulse.normal);
     impulse.normal = sum;
-    framed.twist(rules, change);
+    pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, change);
+    pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, change);
 }

@@ -1,13 +1,12 @@
 //! The Rust doubles of `shaders/*.wgsl`: same names, same order of operations, over a [`Lane`](crate::math::Lane).
 //!
-//! `pair`, `frame`, `contact`, `friction` and `joint` are the doubles of the files of that name in `shaders/lib` and of the kernels that sweep
+//! `pair`, `contact`, `friction` and `joint` are the doubles of the files of that name in `shaders/lib` and of the kernels that sweep
 //! constraints. `integrate` holds the doubles of kernels over bodies, `convergence` and `momentum` those between sweeps. Branches on
 //! data are `select`s; branches on rules are plain `if`s, here and in WGSL.
 
 pub mod axis;
 pub mod contact;
 pub mod convergence;
-pub mod frame;
 pub mod friction;
 pub mod integrate;
 pub mod joint;
@@ -60,31 +59,28 @@ pub struct Rules {
 }
 
 impl Default for Rules {
-    /// [`Rules::PLAIN`].
+    /// Relax sweeps of flat, frictionless contacts.
     fn default() -> Self {
-        Self::PLAIN
+        Self {
+            biased: false,
+            friction: FrictionRule::None,
+            patch: false,
+            friction_first: false,
+            accumulated: true,
+            round: false,
+            as_one: false,
+            driven: false,
+            passes: 1,
+            measured: false,
+            from_start: false,
+            isotropic: false,
+            bounces: false,
+            axes: false,
+        }
     }
 }
 
 impl Rules {
-    /// Relax sweeps of flat, frictionless contacts.
-    pub const PLAIN: Self = Self {
-        biased: false,
-        friction: FrictionRule::None,
-        patch: false,
-        friction_first: false,
-        accumulated: true,
-        round: false,
-        as_one: false,
-        driven: false,
-        passes: 1,
-        measured: false,
-        from_start: false,
-        isotropic: false,
-        bounces: false,
-        axes: false,
-    };
-
     /// The rules of a warm start: where friction acts, and nothing else.
     pub fn of_warm_start(self) -> Self {
         Self { friction: self.friction, patch: self.patch, isotropic: self.isotropic, ..Self::default() }

@@ -74,8 +74,7 @@ pub struct Contact<L> {
     pub preload: L,
 }
 
-/// Double of the WGSL struct `Point`; in the order of `PointRow`, as the lanes have it in memory. Arms are in world axes,
-/// while a sweep uses them in the frame of the contact (`Frame::point`).
+/// Double of the WGSL struct `Point`; in the order of `PointRow`, as the lanes have it in memory.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point<L> {

@@ -1,7 +1,7 @@
 //! Displacement of contact points along the normal. Twin of `normal_movement` and its use in `current_separation`, in
 //! `shaders/lib/contact.wgsl`.
 
-use super::{Lane, Quat, Vec3, conjugate, dot3, turned, vec3};
+use super::{Lane, Quat, Vec3, conjugate, dot3, turned};
 
 /// Displacement of two bodies along a normal: a separation is linear in the arms.
 ///
@@ -30,17 +30,6 @@ impl<L: Lane> NormalMovement<L> {
     pub fn round(self, normal: Vec3<L>, radius_a: L, radius_b: L) -> Self {
         let shift = self.shift + radius_a * dot3(self.turn_a, normal) + radius_b * dot3(self.turn_b, normal);
         Self { shift, ..self }
-    }
-
-    /// The same for arms with components along these axes.
-    #[inline(always)]
-    pub fn in_axes(self, x: Vec3<L>, y: Vec3<L>, z: Vec3<L>) -> Self {
-        let Self { shift, turn_a, turn_b } = self;
-        Self {
-            shift,
-            turn_a: vec3(dot3(turn_a, x), dot3(turn_a, y), dot3(turn_a, z)),
-            turn_b: vec3(dot3(turn_b, x), dot3(turn_b, y), dot3(turn_b, z)),
-        }
     }
 
     /// Displacement of the arm r_b of b away from the arm r_a of a.

@@ -6,7 +6,6 @@ use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
 use drystone::stages::kernels::contact::{
     current_separation, normal_movement, restitute_contact, solve_contact, warm_start,
 };
-use drystone::stages::kernels::frame::{Frame, FramedPair};
 use drystone::stages::kernels::friction::{solve_friction, solve_twist};
 use drystone::stages::kernels::joint::joint_column;
 use drystone::stages::kernels::pair::{relative_movement, relative_velocity};
@@ -56,11 +55,6 @@ impl Case {
         [0, 1].map(|i| InverseMass { mass: self.inverse_mass[i] as f32, inertia: self.inverse_inertia[i].as_mat3() })
     }
 
-    /// A contact with the normal.
-    fn contact(&self) -> Contact<f64> {
-        Contact { normal: lane(self.normal), tangent: lane(self.normal.any_orthonormal_vector()), ..Contact::default() }
-    }
-
     fn contact_row(&self) -> ContactRow {
         let normal = self.normal.as_vec3();
         let tangent = normal.any_orthonormal_vector();
@@ -84,7 +78,7 @@ impl Case {
 
     fn separation(&self, pair: &Pair<f64>) -> f64 {
         let point = Point { r_a: lane(self.r[0]), r_b: lane(self.r[1]), separation: 0.125, ..Point::default() };
-        let contact = self.contact();
+        let contact = Contact { normal: lane(self.normal), ..Contact::default() };
         let movement = normal_movement(Rules::default(), pair, &contact);
         current_separation(&movement, &contact, &point)
     }
@@ -254,21 +248,8 @@ impl Slipping {
     /// One sweep with normal impulse `pressed` from the impulse `before`; the impulse after it.
     fn swept(&mut self, rules: Rules, pressed: f64, before: [f64; 2]) -> [f64; 2] {
         let mut impulse = Impulse { tangent_1: before[0], tangent_2: before[1], ..Impulse::default() };
-        let mut framed = FramedPair::new(rules, &self.pair, Frame::of(&self.contact));
-        let point = framed.frame.point(&self.point);
-        let both = (&mut self.pair, &mut framed);
-        solve_friction(rules, &self.params, both, &self.contact, &point, pressed, &mut impulse);
-        framed.change(rules, &mut self.pair);
+        solve_friction(rules, &self.params, &mut self.pair, &self.contact, &self.point, pressed, &mut impulse);
         [impulse.tangent_1, impulse.tangent_2]
-    }
-
-    /// One sweep of the twist of a patch with this lever; the impulse after it.
-    fn twisted(&mut self, lever: f64) -> f64 {
-        let (rules, mut impulse) = (with(FrictionRule::Disc), Impulse::default());
-        let mut framed = FramedPair::new(rules, &self.pair, Frame::of(&self.contact));
-        solve_twist(rules, &self.params, &mut framed, &self.contact, &self.point, lever, &mut impulse);
-        framed.change(rules, &mut self.pair);
-        impulse.normal
     }
 }
 
@@ -337,7 +318,9 @@ fn relaxation_scales_the_step_of_friction_and_of_twist() {
     let twisted = |relaxation: f64| {
         let mut s = slipping();
         s.params.relaxation = relaxation;
-        s.twisted(100.0)
+        let mut impulse = Impulse::default();
+        solve_twist(Rules::default(), &s.params, &mut s.pair, &s.contact, &s.point, 100.0, &mut impulse);
+        impulse.normal
     };
     assert!(twisted(1.0).abs() > 0.1 && (twisted(0.5) - 0.5 * twisted(1.0)).abs() < 1e-15);
 }
@@ -352,8 +335,10 @@ fn twist_takes_the_spin_about_the_normal_within_mu_times_the_lever() {
         let mut s = slipping();
         s.point.normal_mass =
             1.0 / s.case.inverse_inertia.iter().map(|i| s.case.normal.dot(*i * s.case.normal)).sum::<f64>();
-        let (before, impulse) = (spin(&s), s.twisted(lever));
-        (before, spin(&s), impulse, s.point.normal_mass)
+        let before = spin(&s);
+        let mut impulse = Impulse::default();
+        solve_twist(Rules::default(), &s.params, &mut s.pair, &s.contact, &s.point, lever, &mut impulse);
+        (before, spin(&s), impulse.normal, s.point.normal_mass)
     };
     let (before, after, impulse, mass) = twisted(100.0);
     assert!(before.abs() > 1.0 && after.abs() < 1e-14 && (impulse + mass * before).abs() < 1e-14, "{before} {after}");
@@ -384,7 +369,7 @@ fn pressed(rules: Rules, params: &StepParams<f64>, separation: f64, before: f64)
     let case = case();
     let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
     pair.b.v = lane(case.normal * -3.0);
-    let contact = case.contact();
+    let contact = Contact { normal: lane(case.normal), ..Contact::default() };
     let normal_mass = 1.0 / case.dense(case.normal, case.normal);
     let point = Point { r_a: lane(case.r[0]), r_b: lane(case.r[1]), separation, normal_mass, ..Point::default() };
     let mut impulses = [Impulse { normal: before, ..Impulse::default() }];
@@ -457,7 +442,7 @@ fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
         let parting = StepParams { movable: hard(0.0, 0.0), ..params };
         let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
         pair.b.v = lane(case.normal);
-        let contact = case.contact();
+        let contact = Contact { normal: lane(case.normal), ..Contact::default() };
         let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
         let point = Point { r_a, r_b, separation: -0.01, normal_mass: mass, ..Point::default() };
         let mut impulses = [Impulse { normal: 0.1, peak: 0.3, ..Impulse::default() }];
@@ -476,7 +461,7 @@ fn a_bounce_gives_back_its_share_of_an_approach_above_the_threshold_that_a_conta
     let params = StepParams { restitution_threshold: 1.0, ..StepParams::default() };
     let bounced = |approach_velocity: f64, peak: f64| {
         let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
-        let contact = Contact { restitution: 0.5, ..case.contact() };
+        let contact = Contact { normal: lane(case.normal), restitution: 0.5, ..Contact::default() };
         let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
         let point = Point { r_a, r_b, normal_mass: mass, approach_velocity, ..Point::default() };
         let mut impulses = [Impulse { normal: 0.1, peak, ..Impulse::default() }];

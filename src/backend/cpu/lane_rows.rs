@@ -10,7 +10,6 @@ use std::ops::Range;
 
 use super::constraint::AxisRows;
 use crate::kernels::contact::PointRows;
-use crate::kernels::frame::Frame;
 use crate::kernels::{Axis, Impulse, Point};
 use crate::lanes::{Lanes, Shared, Wide};
 use crate::math::{Vec3, vec3};
@@ -26,7 +25,7 @@ macro_rules! loaded {
 /// The numbers of points, or of the axes of joints, in the order of their rows.
 #[derive(Default)]
 pub(super) struct LanePoints {
-    /// Arms in the frame of the contact, separation, normal mass; the first eight numbers of an axis.
+    /// Arms, separation, normal mass; the first eight numbers of an axis.
     pub arms: Vec<[Wide; 8]>,
     /// Tangent mass; the ninth number of an axis.
     pub tangent_masses: Vec<Wide>,
@@ -252,7 +251,7 @@ impl<L: Lanes> PointRows<L> for GroupRows<'_> {
         self.impulses.normals.len()
     }
     #[inline(always)]
-    fn point(&self, k: usize, _: &Frame<L>) -> Point<L> {
+    fn point(&self, k: usize) -> Point<L> {
         let [ax, ay, az, separation, bx, by, bz, normal_mass] = loaded!(&self.points.arms[k]; 0 1 2 3 4 5 6 7);
         let [approach_velocity, slip_1, slip_2] = match self.points.others.get(k) {
             Some(others) => loaded!(others; 0 1 2),

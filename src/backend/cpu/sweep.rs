@@ -10,20 +10,11 @@ use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_group::{BodyLanes, LaneGroup};
 use super::lane_rows::{GroupRows, OwnImpulses, SharedImpulses, SharedPoints};
-use crate::config::FrictionRule;
-use crate::kernels::contact::{solve_contact, sum_impulse};
-use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Rules, StepParams};
+use crate::kernels::contact::sum_impulse;
+use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
-
-/// The rules of most sweeps: of flat contacts without restitution, in the default settings. They are compiled for these
-/// rules, so that numbers which they do not use take no registers.
-const BIASED: Rules = Rules { biased: true, ..Rules::PLAIN };
-const RELAX: Rules = Rules { friction: FrictionRule::Disc, ..Rules::PLAIN };
-/// The same of bodies with equal moments of inertia.
-const BIASED_CUBES: Rules = Rules { isotropic: true, ..BIASED };
-const RELAX_CUBES: Rules = Rules { isotropic: true, ..RELAX };
 
 /// A pass over the groups of one color. `AS_ONE` is for kernels that treat the points of a manifold as one: their code
 /// would take registers from the other sweeps.
@@ -74,19 +65,7 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
         if C::HAS_POINTS {
             // SAFETY: `Contact` is `repr(C)` and holds lanes only.
             let contact: &Contact<L> = unsafe { as_lanes(&group.header) };
-            match self.kernel {
-                Kernel::SolveContacts(BIASED) if !AS_ONE => {
-                    solve_contact(BIASED, params, &mut pair, contact, &mut rows)
-                }
-                Kernel::SolveContacts(RELAX) if !AS_ONE => solve_contact(RELAX, params, &mut pair, contact, &mut rows),
-                Kernel::SolveContacts(BIASED_CUBES) if !AS_ONE => {
-                    solve_contact(BIASED_CUBES, params, &mut pair, contact, &mut rows);
-                }
-                Kernel::SolveContacts(RELAX_CUBES) if !AS_ONE => {
-                    solve_contact(RELAX_CUBES, params, &mut pair, contact, &mut rows);
-                }
-                kernel => sweep_contact(kernel, AS_ONE, params, &mut pair, contact, &mut rows),
-            }
+            sweep_contact(self.kernel, AS_ONE, params, &mut pair, contact, &mut rows);
         } else {
             let [joint @ .., _]: &[Wide; 11] = &group.header;
             // SAFETY: `Joint` is `repr(C)` and holds lanes only.
@@ -181,7 +160,7 @@ unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &BodyLanes, bod
 /// # Safety
 /// `T` is `repr(C)` and holds `N` lanes and nothing else.
 #[inline(always)]
-pub(super) unsafe fn as_lanes<T, const N: usize>(numbers: &[Wide; N]) -> &T {
+unsafe fn as_lanes<T, const N: usize>(numbers: &[Wide; N]) -> &T {
     const { assert!(size_of::<T>() == size_of::<[Wide; N]>() && align_of::<T>() <= align_of::<Wide>()) };
     // SAFETY: the caller's promise; a lane is sixteen numbers.
     unsafe { &*std::ptr::from_ref(numbers).cast() }

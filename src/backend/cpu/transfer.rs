@@ -8,11 +8,7 @@ use std::ops::Range;
 use super::constraint::Constraint;
 use super::lane_group::{LaneGroup, NO_ROW};
 use super::lane_rows::{LaneImpulses, OwnImpulses, OwnPoints, SharedImpulses, SharedPoints};
-use super::sweep::as_lanes;
-use crate::kernels::Point;
-use crate::kernels::frame::Frame;
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, lanes};
-use crate::math::vec3;
 use crate::problem::StepProblem;
 
 /// The place of a body's state, and whether the body is movable.
@@ -48,19 +44,12 @@ impl<C: Constraint> Work for Load<'_, C> {
         for group in unsafe { self.groups.slice(range) } {
             let own = group.impulses();
             // SAFETY: `LaneLayout::make_groups` gives each group impulses and points of its own.
-            let (mut points, impulses) = unsafe { (self.points.slice(own.clone()), self.impulses.slice(own)) };
+            let (points, impulses) = unsafe { (self.points.slice(own.clone()), self.impulses.slice(own)) };
             self.take_bodies(group);
             if group.is_full() && (C::HAS_POINTS || points.arms.is_empty()) {
-                self.take_full::<L>(group, &mut points, impulses);
+                self.take_full::<L>(group, points, impulses);
             } else {
-                self.take_some(group, &mut points, impulses);
-            }
-            if C::HAS_POINTS {
-                // SAFETY: `Contact` is `repr(C)` and holds lanes only.
-                let frame = Frame::<L>::of(unsafe { as_lanes(&group.header) });
-                for arms in points.arms {
-                    to_frame(&frame, arms);
-                }
+                self.take_some(group, points, impulses);
             }
         }
     }
@@ -80,7 +69,7 @@ impl<C: Constraint> Load<'_, C> {
 
     /// Loads a row into each lane.
     #[inline(always)]
-    fn take_full<L: Lanes>(&self, group: &mut LaneGroup, points: &mut OwnPoints, mut impulses: OwnImpulses) {
+    fn take_full<L: Lanes>(&self, group: &mut LaneGroup, points: OwnPoints, mut impulses: OwnImpulses) {
         let rows = C::rows(self.problem);
         let own: [&C; WIDTH] = lanes!(lane => &rows[group.rows[lane] as usize]);
         let numbers: [&[f32]; WIDTH] = lanes!(lane => bytemuck::cast_slice(std::slice::from_ref(own[lane])));
@@ -115,7 +104,7 @@ impl<C: Constraint> Load<'_, C> {
     }
 
     /// Empty lanes hold zeros.
-    fn take_some(&self, group: &mut LaneGroup, points: &mut OwnPoints, mut impulses: OwnImpulses) {
+    fn take_some(&self, group: &mut LaneGroup, mut points: OwnPoints, mut impulses: OwnImpulses) {
         let rows = C::rows(self.problem);
         let all_impulses = C::impulses(self.problem);
         for (lane, row) in group.rows.into_iter().enumerate() {
@@ -221,18 +210,6 @@ fn last_eight<L: Lanes>(rows: &[&[f32]; WIDTH]) -> [Wide; 8] {
 #[inline(always)]
 fn stored<L: Lanes>([a, b, c, d, e, f, g, h]: [L; 8]) -> [Wide; 8] {
     [a.store(), b.store(), c.store(), d.store(), e.store(), f.store(), g.store(), h.store()]
-}
-
-/// Brings the arms of sixteen points from the axes of the world to the frame of their contact.
-#[inline(always)]
-fn to_frame<L: Lanes>(frame: &Frame<L>, arms: &mut [Wide; 8]) {
-    let point = frame.point(&Point {
-        r_a: vec3(L::load(&arms[0]), L::load(&arms[1]), L::load(&arms[2])),
-        r_b: vec3(L::load(&arms[4]), L::load(&arms[5]), L::load(&arms[6])),
-        ..Point::default()
-    });
-    (arms[0], arms[1], arms[2]) = (point.r_a.x.store(), point.r_a.y.store(), point.r_a.z.store());
-    (arms[4], arms[5], arms[6]) = (point.r_b.x.store(), point.r_b.y.store(), point.r_b.z.store());
 }
 
 /// Writes one lane of some rows.

@@ -164,23 +164,15 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
             (of_joints!(rules.axes, "solve_joints"), Over::Colors, with("solve_joint", rules))
         }
         Kernel::SolveAxes(rules) => (of_joints!(true, "solve_axes"), Over::Colors, with("solve_swept_axes", rules)),
-        Kernel::WarmStart(rules) => (
-            &[part!("lib/pair"), part!("lib/frame"), part!("warm_start")],
-            Over::Colors,
-            with("warm_start_contact", rules),
-        ),
+        Kernel::WarmStart(rules) => {
+            (&[part!("lib/pair"), part!("warm_start")], Over::Colors, with("warm_start_contact", rules))
+        }
         Kernel::SolveContacts(rules) => {
-            let parts = &[
-                part!("lib/pair"),
-                part!("lib/frame"),
-                part!("lib/contact"),
-                part!("lib/friction"),
-                part!("solve_contacts"),
-            ];
+            let parts = &[part!("lib/pair"), part!("lib/contact"), part!("lib/friction"), part!("solve_contacts")];
             (parts, Over::Colors, with("solve_contact", rules))
         }
         Kernel::ApplyRestitution(rules) => (
-            &[part!("lib/pair"), part!("lib/frame"), part!("lib/contact"), part!("apply_restitution")],
+            &[part!("lib/pair"), part!("lib/contact"), part!("apply_restitution")],
             Over::Colors,
             with("restitute_contact", rules),
         ),
