@@ -13,7 +13,7 @@ const LIBRARY: &[&[&str]] = &[
     &["kernels", "plan", "metrics", "rest", "sleep"],
     &["backend", "energy"],
     &["simulation"],
-    &["batch"],
+    &["batch", "character"],
     &["stages"],
 ];
 

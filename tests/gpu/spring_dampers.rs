@@ -37,10 +37,10 @@ fn cube(mass: f32) -> Body {
     Body::dynamic().shape(Shape::cuboid(0.1, 0.1, 0.1)).total_mass(mass)
 }
 
-/// The mean time between two passages of zero upwards, of `measure` in 4 s (s).
+/// The mean time between two passages of zero upwards, of `measure` in 8 s (s).
 fn period(simulation: &mut Simulation, measure: impl Fn(&World) -> f32) -> f32 {
     let (mut times, mut before) = (Vec::new(), measure(&simulation.world));
-    for step in 1..=960 {
+    for step in 1..=1920 {
         simulation.step(DT).expect("a step");
         let now = measure(&simulation.world);
         if before < 0.0 && now >= 0.0 {
