@@ -45,11 +45,8 @@ crate::saved::kinds!(BodyKind { Fixed, Kinematic, Dynamic });
 /// assert_eq!((ice.combine(wood).friction, wood.combine(of(0.8, None)).friction), (0.1, 0.6));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Deserialize, serde::Serialize, schemars::JsonSchema),
-    serde(rename_all = "snake_case")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub enum CombineRule {
     /// (a + b)/2.
