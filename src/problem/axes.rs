@@ -12,11 +12,12 @@
 
 use std::f32::consts::{PI, TAU};
 
-use super::rows::{AxisRow, BodyRow, NO_LIMIT};
+use glam::Vec3;
+
+use super::effective::InverseMass;
+use super::rows::{AxisRow, JointRow, MassRow, NO_LIMIT};
 use super::softness::softness;
 use super::{NodeRow, StepProblem};
-use crate::kernels::axis::{axis_inverse_mass, axis_motion};
-use crate::kernels::rows::{Axis as AxisOf, Body as BodyOf, Joint as JointOf, Mass, Pair};
 use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear, World};
 
 /// Springs that turn by more than this in a substep (rad) are integrated implicitly, which takes energy: several of them on one body would gain
@@ -171,16 +172,12 @@ pub(super) fn has_spring_dampers(joint: &Joint) -> bool {
 /// Completes the rows of springs with constants of their own, for substeps of `substep` seconds: on what they move now,
 /// they are springs of the frequency √(k/m)/2π and the damping ratio c/2√(k m).
 pub(super) fn tune(joint: &Joint, number: usize, substep: f32, problem: &mut StepProblem) {
-    let row = &problem.joints[number];
-    let mass = |body: u32| Mass::load(&problem.masses[body as usize]);
-    let [a, b] = [BodyOf::<f32>::load(&BodyRow::AT_REST); 2];
-    let pair = Pair { a, b, mass_a: mass(row.body_a), mass_b: mass(row.body_b), ..Pair::default() };
-    let (anchors, first) = (JointOf::<f32>::load(row), row.first_axis as usize);
+    let row = problem.joints[number];
+    let first = row.first_axis as usize;
     for (k, (i, _)) in (first..).zip(kinds(joint).filter(|(_, is_drive)| *is_drive)) {
         let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
         let Drive::SpringDamper { stiffness, damping, .. } = axis.drive else { continue };
-        let motion = axis_motion(&pair, &anchors, &AxisOf::<f32>::load(&problem.axes[k]));
-        let inverse_mass = axis_inverse_mass(&pair, &motion);
+        let inverse_mass = inverse_mass_along(&row, &problem.axes[k], &problem.masses);
         let omega = (stiffness * inverse_mass).sqrt();
         if omega > 0.0 {
             let [rate, impulse_scale] = spring(omega / TAU, 0.5 * damping * inverse_mass / omega, substep);
@@ -188,6 +185,18 @@ pub(super) fn tune(joint: &Joint, number: usize, substep: f32, problem: &mut Ste
             (row.rate, row.mass_scale, row.impulse_scale) = (rate, 1.0 - impulse_scale, impulse_scale);
         }
     }
+}
+
+/// The speed that a unit impulse along an axis gives when the step begins (1/kg; about an axis 1/(kg m²)).
+fn inverse_mass_along(joint: &JointRow, axis: &AxisRow, masses: &[MassRow]) -> f32 {
+    let direction = Vec3::from_array(axis.direction);
+    let is_linear = axis.is_linear > 0.0;
+    let of = |body: u32, arm: [f32; 3]| {
+        let inverse = InverseMass::of(&masses[body as usize]);
+        let about = if is_linear { Vec3::from_array(arm).cross(direction) } else { direction };
+        (if is_linear { inverse.mass } else { 0.0 }) + about.dot(inverse.inertia * about)
+    };
+    of(joint.body_a, joint.r_a) + of(joint.body_b, joint.r_b)
 }
 
 fn largest(max_load: f32, h: f32) -> f32 {
