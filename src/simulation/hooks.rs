@@ -78,13 +78,14 @@ pub trait ContactHooks: Send {
 /// use drystone::{Body, ContactHooks, PendingContact, PendingPoint, Reference, Shape, Simulation, SolverConfig, World};
 /// use drystone::glam::Vec3;
 ///
-/// /// Only the upper side of a platform holds.
+/// /// A platform holds what comes down on it.
 /// struct OneWay(usize);
 ///
 /// impl ContactHooks for OneWay {
-///     fn modify(&mut self, _: &World, contact: &mut PendingContact) {
-///         let up = if contact.a.body.index() == self.0 { contact.normal.y } else { -contact.normal.y };
-///         if [contact.a, contact.b].iter().any(|side| side.body.index() == self.0) && up < 0.9 {
+///     fn modify(&mut self, world: &World, contact: &mut PendingContact) {
+///         let [a, b] = [contact.a, contact.b].map(|side| side.body.index());
+///         let other = if a == self.0 { b } else { a };
+///         if [a, b].contains(&self.0) && world.bodies[other].linear_velocity.y > 0.0 {
 ///             contact.points_mut().iter_mut().for_each(|point: &mut PendingPoint| point.is_dropped = true);
 ///         }
 ///     }
