@@ -195,7 +195,6 @@ impl Effort {
                 self.begin(world, config, dt);
             }
         }
-        // No contact holds bodies of two classes.
         let is_restless = !self.restless.is_empty();
         let changed = (is_first || self.any_above || is_above || is_restless)
             && self.follow_islands(world, asleep, interfaces(), dt);

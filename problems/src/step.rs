@@ -2,7 +2,7 @@
 
 use drystone::stages::plan::{Kernel, Pass};
 use drystone::stages::problem::ContactRow;
-use drystone::{Backend, BodyKind, Error, Reference, Result, Simulation, StepPlan, StepProblem, StepStats};
+use drystone::{Backend, Body, Error, Reference, Result, Simulation, StepPlan, StepProblem, StepStats};
 
 use crate::contacts::ContactProblem;
 use crate::residuals::Residuals;
@@ -70,9 +70,7 @@ fn check(simulation: &Simulation, name: &str) -> Result<()> {
         let joints = world.joints.len();
         return Err(Error::input(format!("{name} has {joints} joints: a contact problem cannot have joints")));
     }
-    if let Some(i) =
-        world.bodies.iter().position(|body| body.kind == BodyKind::Dynamic && body.locked_rotations != [false; 3])
-    {
+    if let Some(i) = world.bodies.iter().position(Body::has_locked_rotation) {
         let name = &world.bodies[i].name;
         return Err(Error::input(format!(
             "body {i} {name:?} has locked rotations: a body of a contact problem turns freely"

@@ -203,7 +203,7 @@ impl Character {
 
     /// The way from `start` through the next step.
     fn way(&self, around: &Surroundings, start: Vec3, velocity: Vec3, gravity: Vec3, dt: f32) -> Walked {
-        let walk = velocity - velocity.dot(self.up) * self.up;
+        let walk = around.across(velocity);
         let Some(ground) = self.ground else {
             return self.fly(around, start, self.drift, (walk, gravity), dt);
         };

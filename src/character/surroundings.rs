@@ -6,10 +6,10 @@ use parry3d::math::Pose;
 
 use super::nearest::{HalfSpace, nearest};
 use super::{Character, Ground};
-use crate::collide::clearances;
+use crate::collide::{Clearance, clearances};
 use crate::math::rotation::{about, product, unit};
 use crate::queries::{Filter, Hit, Queries};
-use crate::world::{Body, BodyHandle, BodyKind, World, placed, pose};
+use crate::world::{Body, BodyHandle, BodyKind, Collider, World, placed, pose};
 
 /// Distance at which the character touches, relative to its margin.
 const NEAR: f32 = 1.25;
@@ -89,7 +89,7 @@ impl<'a> Surroundings<'a> {
         let (own, part) = (&world.bodies[character.body.index()], world.bodies.worlds()[character.body.index()]);
         let up = character.up;
         let end = |up: Vec3| {
-            let height = |collider: &crate::world::Collider| {
+            let height = |collider: &Collider| {
                 let local = placed(pose(Vec3::ZERO, own.rotation), pose(collider.position, collider.rotation));
                 let support = collider.shape.0.as_support_map().map(|map| map.support_point(&local, up));
                 support.map_or(0.0, |point| up.dot(point))
@@ -190,7 +190,7 @@ impl<'a> Surroundings<'a> {
                 };
                 let stood = if self.moves(body) { moved() } else { stood };
                 clearances((&collider.shape, &stood), (&own.shape, &own_pose), within, self.up, &mut |clearance| {
-                    let crate::collide::Clearance { normal, distance, point, upright } = clearance;
+                    let Clearance { normal, distance, point, upright } = clearance;
                     let hit = Hit { body, collider: index, distance, point, normal };
                     touches.push(Touch { hit, upright, is_near: distance <= NEAR * self.margin });
                 });

@@ -73,7 +73,7 @@ crate::saved::fields!(KnownBody { generation, world, colliders });
 
 /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
 fn jointed(world: &World) -> HashSet<(u32, u32)> {
-    let apart = world.joints.iter().filter(|joint| joint.enabled && !joint.collide);
+    let apart = world.enabled_joints().filter(|joint| !joint.collide);
     let ends = |joint: &Joint| (joint.body_a.index() as u32, joint.body_b.map(|b| b.index() as u32));
     apart.map(ends).filter_map(|(a, b)| Some(key(a, b?))).collect()
 }
@@ -338,7 +338,7 @@ impl Detector {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
         let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i), world.gravity_on(i));
         world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
-        for (a, b) in world.joints.iter().filter(|joint| joint.enabled).map(Joint::indices) {
+        for (a, b) in world.enabled_joints().map(Joint::indices) {
             [Some(a), b].into_iter().flatten().for_each(|body| self.moving[body].tied = 1.0);
         }
         self.falls.clear();

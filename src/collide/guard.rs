@@ -125,8 +125,7 @@ impl Detector {
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut islands = Islands::default();
         islands.reset(world.bodies.len());
-        let tied = world.joints.iter().filter(|joint| joint.enabled);
-        for (a, b) in tied.filter_map(|joint| Some((joint.indices().0, joint.indices().1?))) {
+        for (a, b) in world.enabled_joints().filter_map(|joint| Some((joint.indices().0, joint.indices().1?))) {
             if is_dynamic(a) && is_dynamic(b) {
                 islands.join(a as u32, b as u32);
             }

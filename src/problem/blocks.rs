@@ -112,7 +112,7 @@ pub fn lay_out(
         for (i, block) in blocks.iter_mut().enumerate() {
             let is_of =
                 |row: u32| count == 1 || block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
-            let jams = |row: u32| contacts.jams(row);
+            let jams = contacts.jams();
             let is_struck = |row: u32| contacts.is_struck(row) && !jams(row);
             let is_swept_once = |row: u32| is_of(row) && !jams(row) && !is_struck(row);
             let [first, struck] = deal_colors(&contacts.coloring, order, colors, is_swept_once);

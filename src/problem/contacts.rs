@@ -69,7 +69,7 @@ crate::saved::cloned!(ContactRows {
 } scratch { graph, poses, struck, fast, jointed, new_bodies });
 
 /// What the materials of a world have in common.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Materials {
     /// Whether any surface bounces.
     bounce: bool,
@@ -80,12 +80,21 @@ struct Materials {
 crate::saved::fields!(Materials { bounce, may_jam });
 
 impl Materials {
-    fn of(world: &World) -> Self {
-        let any = |has: fn(Material) -> bool| world.bodies.iter().flat_map(Body::materials).any(has);
+    fn among(all: impl Iterator<Item = Material> + Clone) -> Self {
         Self {
-            bounce: any(|material| material.restitution > 0.0),
-            may_jam: any(|material| material.friction > LEAST_JAMMING),
+            bounce: all.clone().any(|material| material.restitution > 0.0),
+            may_jam: all.clone().any(|material| material.friction > LEAST_JAMMING),
         }
+    }
+
+    fn of(world: &World) -> Self {
+        Self::among(world.bodies.iter().flat_map(Body::materials))
+    }
+
+    /// The same with the materials that hooks gave.
+    fn and(self, hooked: &[Option<Material>]) -> Self {
+        let Self { bounce, may_jam } = Self::among(hooked.iter().flatten().copied());
+        Self { bounce: self.bounce || bounce, may_jam: self.may_jam || may_jam }
     }
 }
 
@@ -281,17 +290,14 @@ impl ContactRows {
 
     /// Whether any contact that takes part jams.
     pub fn any_jamming(&self) -> bool {
-        self.may_jam() && self.slots.taking_part().any(|row| self.jams[row as usize])
+        let jams = self.jams();
+        self.slots.taking_part().any(jams)
     }
 
     /// Whether the contact in a row jams.
-    pub fn jams(&self, row: u32) -> bool {
-        self.may_jam() && self.jams[row as usize]
-    }
-
-    fn may_jam(&self) -> bool {
-        self.materials.is_some_and(|materials| materials.may_jam)
-            || self.hooked.iter().flatten().any(|material| material.friction > LEAST_JAMMING)
+    pub fn jams(&self) -> impl Fn(u32) -> bool + '_ {
+        let may_jam = self.materials.unwrap_or_default().and(&self.hooked).may_jam;
+        move |row| may_jam && self.jams[row as usize]
     }
 
     /// Whether the points of any contact are struck together.
@@ -392,9 +398,9 @@ impl ContactRows {
         self.lay_out(patches, problem);
         problem.params.point_count = problem.points.len() as u32;
         problem.params.patches = patches.into();
-        let materials = *self.materials.get_or_insert_with(|| Materials::of(world));
-        let hooked_bounces = self.hooked.iter().flatten().any(|material| material.restitution > 0.0);
-        self.carry.approach = config.friction_rule() == FrictionRule::Slip || materials.bounce || hooked_bounces;
+        let Materials { bounce, may_jam } =
+            self.materials.get_or_insert_with(|| Materials::of(world)).and(&self.hooked);
+        self.carry.approach = config.friction_rule() == FrictionRule::Slip || bounce;
         self.carry.tangents = matches!(config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
         let substep = Substep::new(config, dt / config.substeps as f32);
         self.carry.preload = Preload {
@@ -404,7 +410,6 @@ impl ContactRows {
             warm_start: config.warm_start.into(),
         };
         self.note_written(detector);
-        let may_jam = self.may_jam();
         let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
         let Self { slots, carry, patches, computed, poses, jams, classes, hooked, .. } = self;
         let pose = |body: &Body| PoseRow {

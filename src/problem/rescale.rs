@@ -39,7 +39,10 @@ impl StepScale {
 
 /// Brings a contact from substeps of one share of those of class 0 to another, so that it bears the same force. Its springs get stiffer by
 /// the square of the ratio, and are then compressed by as much less; the preload takes up what the bodies already sank in. Without that a
-/// tower of 1 and 1000 times in turn jumped up with 0.9 m/s when its substeps were doubled. `sag` is that of [`change_compliance`].
+/// tower of 1 and 1000 times in turn jumped up with 0.9 m/s when its substeps were doubled. `sag` is how much the load of the contact
+/// compresses the springs that it had.
+///
+/// An overlap beyond that is no load but a push. A preload that took it up held a body 0.25 m deep in a wall, which was on its way out of it.
 pub(super) fn change_share(
     contact: &mut ContactRow,
     share: f32,
@@ -49,19 +52,11 @@ pub(super) fn change_share(
 ) {
     let ratio = ratio(share, contact.substep_share);
     contact.substep_share = share;
-    change_compliance(contact, ratio * ratio, sag, points);
-    impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, ratio));
-}
-
-/// Brings a contact to springs that the same force compresses `factor` times as much. `sag` is how much what the contact bears compresses
-/// the springs that it had.
-///
-/// An overlap beyond that is no load but a push. A preload that took it up held a body 0.25 m deep in a wall, which was on its way out of it.
-fn change_compliance(contact: &mut ContactRow, factor: f32, sag: f32, points: &[PointRow]) {
     let points = &points[..contact.point_count as usize];
     let separation = points.iter().map(|point| point.separation).sum::<f32>() / points.len() as f32;
     let compression = (contact.preload - separation).max(0.0).min(LARGEST_PRELOAD as f32 * sag);
-    contact.preload += (factor - 1.0) * compression;
+    contact.preload += (ratio * ratio - 1.0) * compression;
+    impulses.iter_mut().for_each(|impulse| scale_impulse(impulse, ratio));
 }
 
 fn scale_impulse(impulse: &mut ImpulseRow, factor: f32) {

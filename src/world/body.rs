@@ -793,8 +793,14 @@ impl Body {
         self.kind == BodyKind::Dynamic && (self.linear_damping > 0.0 || self.angular_damping > 0.0)
     }
 
-    /// Whether rotation about a world axis is locked.
-    pub(crate) fn has_locked_rotation(&self) -> bool {
+    /// Whether the body is dynamic and rotation about a world axis is locked.
+    ///
+    /// ```
+    /// use drystone::Body;
+    ///
+    /// assert!(Body::dynamic().locked_rotations([true, false, false]).has_locked_rotation());
+    /// ```
+    pub fn has_locked_rotation(&self) -> bool {
         self.kind == BodyKind::Dynamic && self.locked_rotations != [false; 3]
     }
 
@@ -823,7 +829,7 @@ impl Body {
     }
 
     /// The materials of the body and of its colliders.
-    pub(crate) fn materials(&self) -> impl Iterator<Item = Material> + '_ {
+    pub(crate) fn materials(&self) -> impl Iterator<Item = Material> + Clone + '_ {
         std::iter::once(self.material).chain(self.colliders.iter().filter_map(|c| c.material))
     }
 

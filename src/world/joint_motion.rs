@@ -185,6 +185,10 @@ impl Axis {
         }
         let message = || format!("{name}: a motor or a spring cannot move a locked axis: free or limit the axis");
         ensure(self.bounds != Bounds::Locked || self.drive == Drive::None, message)?;
+        let check_target = |target: f32| {
+            let message = || format!("{name}: target = {target}: must be within {least} and {most}");
+            ensure((least..=most).contains(&target), message)
+        };
         let max_load = match self.drive {
             Drive::None => return Ok(()),
             Drive::Motor { speed, max_load } => {
@@ -193,8 +197,7 @@ impl Axis {
                 max_load
             }
             Drive::Spring { target, frequency, damping_ratio, max_load } => {
-                let message = || format!("{name}: target = {target}: must be within {least} and {most}");
-                ensure((least..=most).contains(&target), message)?;
+                check_target(target)?;
                 let message = || format!("{name}: frequency = {frequency}: must be above 0 and at most 1e6 Hz");
                 ensure(frequency > 0.0 && frequency <= 1e6, message)?;
                 let message = || format!("{name}: damping_ratio = {damping_ratio}: must be 0 to 1e6");
@@ -202,8 +205,7 @@ impl Axis {
                 max_load
             }
             Drive::SpringDamper { target, stiffness, damping, max_load } => {
-                let message = || format!("{name}: target = {target}: must be within {least} and {most}");
-                ensure((least..=most).contains(&target), message)?;
+                check_target(target)?;
                 let message = || format!("{name}: stiffness = {stiffness}: must be above 0 and at most 1e30");
                 ensure(stiffness > 0.0 && stiffness <= 1e30, message)?;
                 let message = || format!("{name}: damping = {damping}: must be 0 to 1e30");

@@ -253,11 +253,12 @@ impl World {
 
     /// Largest error of any joint (m): the distance of its anchors along locked axes, and beyond its limits.
     pub fn joint_gap(&self) -> f32 {
-        self.joints
-            .iter()
-            .filter(|joint| joint.enabled)
-            .map(|joint| self.joint_motion(joint).gap(joint))
-            .fold(0.0, f32::max)
+        self.enabled_joints().map(|joint| self.joint_motion(joint).gap(joint)).fold(0.0, f32::max)
+    }
+
+    /// The joints that act.
+    pub(crate) fn enabled_joints(&self) -> impl Iterator<Item = &Joint> {
+        self.joints.iter().filter(|joint| joint.enabled)
     }
 
     /// Refuses a world that cannot be simulated:

@@ -11,7 +11,6 @@ use rayon::prelude::*;
 
 use super::super::bodies::mass_row;
 use super::super::carry::Carry;
-use super::super::effective::LEAST_JAMMING;
 use super::super::prepare::{ComputedRow, PoseRow};
 use super::super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
 use super::super::slots::Write;
@@ -144,8 +143,7 @@ impl ContactRows {
             brings_impulses: false,
             patches: *patches,
             hooked,
-            may_jam: materials.unwrap_or_else(|| Materials::of(world)).may_jam
-                || hooked.iter().flatten().any(|material| material.friction > LEAST_JAMMING),
+            may_jam: materials.unwrap_or_else(|| Materials::of(world)).and(hooked).may_jam,
         };
         let slips = rule == FrictionRule::Slip && !*patches;
         let task = |first: usize| {

@@ -67,10 +67,11 @@ impl WorldContacts {
         let mut scratch = PairScratch::default();
         let mut again = self.pairs[first as usize].clone();
         let begin = |pair: &Pair, again: &mut Pair| {
-            let Pair { body_a, body_b, colliders, collider_a, collider_b, size, takes_part, .. } = *pair;
+            let Pair {
+                body_a, body_b, colliders, collider_a, collider_b, size, takes_part, is_mended, is_refused, ..
+            } = *pair;
             let mut manifolds = std::mem::take(&mut again.manifolds);
             manifolds.clear();
-            let (is_mended, is_refused) = (pair.is_mended, pair.is_refused);
             *again = Pair {
                 body_a,
                 body_b,
