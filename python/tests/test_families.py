@@ -56,6 +56,8 @@ def test_rows_are_the_same_by_every_engine_and_a_file_goes_on(found: ds.Stabilit
 @pytest.mark.ray
 def test_rows_are_the_same_on_ray(found: ds.Stability) -> None:
     ray = pytest.importorskip("ray")
+    # A cluster of its own: Ray would join one that a stopped program left behind.
+    ray.init(address="local", log_to_driver=False)
     try:
         far = ds.survey.families(GRID, family=SMALL, seeds=4, engine="ray", twice=0.2)
     finally:
