@@ -381,37 +381,43 @@ fn impulses_of_axes_follow_their_joint_and_its_substeps() {
     assert!(problem.joint_impulses[1..].iter().all(|row| row.linear[0] == 0.0));
 }
 
-/// A rod of 40 g on a hinge, and a ball of 1 kg on a slider, without gravity.
-fn driven(is_hinge: bool, drive: impl Fn(Joint) -> Joint, open: Open) -> Simulation {
+/// Rods of 40 g on hinges, or boxes of 1 kg on sliders, in a row without gravity: one for each drive.
+fn driven(is_hinge: bool, drives: &[&dyn Fn(Joint) -> Joint], open: Open) -> Simulation {
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-    let body = Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1));
-    let joint = if is_hinge {
-        let rod = world.add(body.density(1.0).position(0.0, 0.5, 0.0));
-        Joint::to_world(rod, Vec3::Y * -0.5, Vec3::ZERO).hinge(Vec3::Z)
-    } else {
-        let sled = world.add(body.total_mass(1.0));
-        Joint::to_world(sled, Vec3::ZERO, Vec3::ZERO).slider(Vec3::X)
-    };
-    world.join(drive(joint));
+    for (i, drive) in drives.iter().enumerate() {
+        let apart = Vec3::Z * (2.0 * i as f32);
+        let body = Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1));
+        let joint = if is_hinge {
+            let rod = world.add(body.density(1.0).position(0.0, 0.5, apart.z));
+            Joint::to_world(rod, Vec3::Y * -0.5, apart).hinge(Vec3::Z)
+        } else {
+            let sled = world.add(body.total_mass(1.0).position(0.0, 0.0, apart.z));
+            Joint::to_world(sled, Vec3::ZERO, apart).slider(Vec3::X)
+        };
+        world.join(drive(joint));
+    }
     simulate(world, open)
 }
 
 fn a_drive_pushes_no_axis_beyond_its_limit(open: Open) {
     for is_hinge in [true, false] {
-        let at = |world: &World| if is_hinge { angle(world) } else { place(world) };
+        let limited = |joint: Joint| joint.limited(-1.0, 1.0);
+        let drives: [&dyn Fn(Joint, f32) -> Joint; 5] = [
+            &|joint, sign| limited(joint.motor(sign * 1.5, 1.0)),
+            &|joint, sign| limited(joint.motor(sign * 1.5, 100.0)),
+            &|joint, sign| limited(joint.motor(sign * 1.5, 1000.0)),
+            &|joint, sign| limited(joint.spring(sign * 2.5, 2.0, 1.0)),
+            &|joint, sign| limited(joint.spring(sign * 2.5, 20.0, 1.0)),
+        ];
         for sign in [1.0, -1.0] {
-            for load in [1.0, 100.0, 1000.0] {
-                let mut simulation = driven(is_hinge, |j| j.motor(sign * 1.5, load).limited(-1.0, 1.0), open);
-                steps(&mut simulation, 2.0, |_, _| {});
-                let beyond = sign * at(&simulation.world) - 1.0;
-                assert!(beyond.abs() < 1e-3, "a motor of {load}: {beyond} beyond its limit");
-            }
-            for frequency in [2.0, 20.0] {
-                let mut simulation =
-                    driven(is_hinge, |j| j.spring(sign * 2.5, frequency, 1.0).limited(-1.0, 1.0), open);
-                steps(&mut simulation, 2.0, |_, _| {});
-                let beyond = sign * at(&simulation.world) - 1.0;
-                assert!(beyond.abs() < 1e-3, "a spring of {frequency} Hz: {beyond} beyond its limit");
+            let signed = drives.map(|drive| move |joint| drive(joint, sign));
+            let each: Vec<&dyn Fn(Joint) -> Joint> = signed.iter().map(|drive| drive as _).collect();
+            let mut simulation = driven(is_hinge, &each, open);
+            steps(&mut simulation, 2.0, |_, _| {});
+            for (i, joint) in simulation.world.joints.iter().enumerate() {
+                let at = simulation.world.joint_motion(joint).position[if is_hinge { 3 } else { 0 }];
+                let beyond = sign * at - 1.0;
+                assert!(beyond.abs() < 1e-3, "drive {i}: {beyond} beyond its limit");
             }
         }
     }
@@ -419,14 +425,19 @@ fn a_drive_pushes_no_axis_beyond_its_limit(open: Open) {
 
 /// A body on a generic joint that leaves the angle about the first axis free, as a hinge does.
 fn a_spring_past_pi_pulls_back_the_shorter_way(open: Open) {
-    for target in [2.5, 3.0, -2.5] {
-        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-        let body = world.add(Body::dynamic().density(1.0).shape(Shape::cuboid(0.1, 0.5, 0.1)));
+    let targets = [2.5, 3.0, -2.5];
+    let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    for (i, target) in targets.into_iter().enumerate() {
+        let apart = Vec3::X * (2.0 * i as f32);
+        let body = Body::dynamic().density(1.0).shape(Shape::cuboid(0.1, 0.5, 0.1));
+        let body = world.add(body.position(apart.x, 0.0, 0.0));
         let angular = [Axis::FREE.spring(target, 5.0, 0.2, f32::MAX), Axis::LOCKED, Axis::LOCKED];
-        world.join(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::LOCKED; 3], angular));
-        let mut simulation = simulate(world, open);
-        steps(&mut simulation, 4.0, |_, _| {});
-        let motion = simulation.world.joint_motion(&simulation.world.joints[0]);
+        world.join(Joint::to_world(body, Vec3::ZERO, apart).generic([Axis::LOCKED; 3], angular));
+    }
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 4.0, |_, _| {});
+    for (joint, target) in simulation.world.joints.iter().zip(targets) {
+        let motion = simulation.world.joint_motion(joint);
         let off = motion.position[3] - target;
         assert!(off.abs() < 1e-3, "target {target}: {off} rad off");
         assert!(motion.speed[3].abs() < 1e-2, "target {target}: {} rad/s", motion.speed[3]);
@@ -434,20 +445,25 @@ fn a_spring_past_pi_pulls_back_the_shorter_way(open: Open) {
 }
 
 fn a_limit_stands_where_it_is_however_far_the_other_one_is(open: Open) {
-    for far in [1e3, 1e6, 1e9, f32::INFINITY] {
-        for (min, max, sign) in [(-far, 5.0, 1.0), (-5.0, far, -1.0)] {
-            let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-            let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X * 3.0 * sign, Vec3::ZERO));
-            world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).slider(Vec3::X).limited(min, max));
-            let mut simulation = simulate(world, open);
-            steps(&mut simulation, 3.0, |_, _| {});
-            let at = sign * place(&simulation.world);
-            assert!((at - 5.0).abs() < 1e-4, "limits {min} and {max}: stops at {at}");
-            assert_eq!(simulation.world.joint_motion(&simulation.world.joints[0]).position[1].abs(), 0.0);
-        }
+    let limits = [1e3, 1e6, 1e9, f32::INFINITY].map(|far| [(-far, 5.0), (-5.0, far)]).concat();
+    let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    for (i, &(min, max)) in limits.iter().enumerate() {
+        let apart = Vec3::Z * (2.0 * i as f32);
+        let towards = if max == 5.0 { 3.0 } else { -3.0 };
+        let ball = Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X * towards, Vec3::ZERO);
+        let ball = world.add(ball.position(0.0, 0.0, apart.z));
+        world.join(Joint::to_world(ball, Vec3::ZERO, apart).slider(Vec3::X).limited(min, max));
+    }
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 3.0, |_, _| {});
+    for (joint, (min, max)) in simulation.world.joints.iter().zip(limits) {
+        let [at, aside, ..] = simulation.world.joint_motion(joint).position;
+        let limit = if max == 5.0 { 5.0 } else { -5.0 };
+        assert!((at - limit).abs() < 1e-4, "limits {min} and {max}: stops at {at}");
+        assert_eq!(aside.abs(), 0.0);
     }
     // Without a limit on either side it goes on.
-    let mut simulation = driven(false, |j| j.motor(1.0, 1e3).limited(f32::NEG_INFINITY, f32::INFINITY), open);
+    let mut simulation = driven(false, &[&|j| j.motor(1.0, 1e3).limited(f32::NEG_INFINITY, f32::INFINITY)], open);
     steps(&mut simulation, 1.0, |_, _| {});
     assert!((place(&simulation.world) - 1.0).abs() < 0.01, "{}", place(&simulation.world));
 }

@@ -37,40 +37,51 @@ fn cube(mass: f32) -> Body {
     Body::dynamic().shape(Shape::cuboid(0.1, 0.1, 0.1)).total_mass(mass)
 }
 
-/// The mean time between two passages of zero upwards, of `measure` in 8 s (s).
-fn period(simulation: &mut Simulation, measure: impl Fn(&World) -> f32) -> f32 {
-    let (mut times, mut before) = (Vec::new(), measure(&simulation.world));
+/// The mean times between two passages of zero upwards, of all that `measure` gives, in 8 s (s).
+fn periods<const N: usize>(simulation: &mut Simulation, measure: impl Fn(&World) -> [f32; N]) -> [f32; N] {
+    let (mut times, mut before) = ([const { Vec::new() }; N], measure(&simulation.world));
     for step in 1..=1920 {
         simulation.step(DT).expect("a step");
         let now = measure(&simulation.world);
-        if before < 0.0 && now >= 0.0 {
-            times.push((step as f32 - now / (now - before)) * DT);
+        for i in 0..N {
+            if before[i] < 0.0 && now[i] >= 0.0 {
+                times[i].push((step as f32 - now[i] / (now[i] - before[i])) * DT);
+            }
         }
         before = now;
     }
-    assert!(times.len() > 2, "{} passages", times.len());
-    (times[times.len() - 1] - times[0]) / (times.len() - 1) as f32
+    times.map(|times| {
+        assert!(times.len() > 2, "{} passages", times.len());
+        (times[times.len() - 1] - times[0]) / (times.len() - 1) as f32
+    })
 }
 
 fn near(what: &str, measured: f32, exact: f32, share: f32) {
     assert!((measured / exact - 1.0).abs() < share, "{what}: {measured}, not {exact}");
 }
 
-/// A mass that a slider leads along X, away from the place of its spring.
+/// Adds a mass that a slider leads along X, away from the place of its spring.
+fn add_on_a_slider(world: &mut World, mass: f32, spring: Axis) {
+    let apart = Vec3::Z * world.bodies.len() as f32;
+    let body = world.add(cube(mass).position(0.2, 0.0, apart.z));
+    let slider = Joint::to_world(body, Vec3::ZERO, apart).along(Vec3::X);
+    world.join(slider.generic([spring, Axis::LOCKED, Axis::LOCKED], [Axis::LOCKED; 3]));
+}
+
 fn on_a_slider(mass: f32, spring: Axis) -> World {
     let mut world = weightless();
-    let body = world.add(cube(mass).position(0.2, 0.0, 0.0));
-    let slider = Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).along(Vec3::X);
-    world.join(slider.generic([spring, Axis::LOCKED, Axis::LOCKED], [Axis::LOCKED; 3]));
+    add_on_a_slider(&mut world, mass, spring);
     world
 }
 
 fn a_spring_of_a_stiffness_swings_with_the_mass_that_it_moves(open: Open) {
-    let stiffness = 100.0_f32;
-    for mass in [0.5_f32, 2.0, 8.0] {
-        let mut simulation =
-            simulation(on_a_slider(mass, Axis::FREE.spring_damper(0.0, stiffness, 0.0, f32::MAX)), open);
-        let measured = period(&mut simulation, |world| world.bodies[0].position.x);
+    let (stiffness, masses) = (100.0_f32, [0.5_f32, 2.0, 8.0]);
+    let mut world = weightless();
+    for mass in masses {
+        add_on_a_slider(&mut world, mass, Axis::FREE.spring_damper(0.0, stiffness, 0.0, f32::MAX));
+    }
+    let measured = periods(&mut simulation(world, open), |world| [0, 1, 2].map(|i| world.bodies[i].position.x));
+    for (mass, measured) in masses.into_iter().zip(measured) {
         near(&format!("period of {mass} kg"), measured, TAU * (mass / stiffness).sqrt(), 2e-3);
     }
 }
@@ -107,7 +118,8 @@ fn a_torsion_spring_turns_a_rod_about_its_end(open: Open) {
     world.join(hinge(body, 0.0));
     let mut free = simulation(world, open);
     let inertia = 2.0 * ((1.0 + 0.04_f32.powi(2)) / 12.0 + 0.25);
-    near("period", period(&mut free, angle), TAU * (inertia / stiffness).sqrt(), 4e-3);
+    let [measured] = periods(&mut free, |world| [angle(world)]);
+    near("period", measured, TAU * (inertia / stiffness).sqrt(), 4e-3);
 
     let mut world = World::new();
     let body = world.add(rod(0.0));
@@ -126,7 +138,8 @@ fn a_spring_between_two_bodies_swings_with_their_reduced_mass(open: Open) {
     world.join(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).at_distance(spring));
     let mut simulation = simulation(world, open);
     let reduced = masses[0] * masses[1] / (masses[0] + masses[1]);
-    let measured = period(&mut simulation, |world| world.bodies[1].position.x - world.bodies[0].position.x - 1.0);
+    let apart = |world: &World| [world.bodies[1].position.x - world.bodies[0].position.x - 1.0];
+    let [measured] = periods(&mut simulation, apart);
     near("period", measured, TAU * (reduced / stiffness).sqrt(), 2e-3);
     assert!(simulation.world.linear_momentum().length() < 1e-4);
 }
