@@ -34,7 +34,7 @@ pub(super) fn no_direction(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let most = f64::from(world.bodies.iter().map(|b| b.mass.mass).sum::<f32>()) * 0.5 * limit * limit;
         let mut simulation = setup.simulation(world)?;
         let gained = largest(LEAST, watch(&mut simulation, 300, energy)?) - before;
-        checks.at_most(format!("{what}: energy gained over what the push limit allows"), gained / most, 1.0);
+        checks.at_most(format!("{what}: energy gained over the energy at the push limit"), gained / most, 1.0);
         checks.finite(&format!("{what}: "), &simulation.world);
         Ok(())
     };
@@ -120,7 +120,7 @@ pub(super) fn no_inertia(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
     let moved = still.iter().map(|&i| before.bodies[i].position.distance(simulation.world.bodies[i].position).into());
     checks.finite("", &simulation.world);
-    checks.at_most("way of what lies still [mm]", 1e3 * largest(LEAST, moved), 1.0);
+    checks.at_most("distance moved by bodies at rest [mm]", 1e3 * largest(LEAST, moved), 1.0);
     checks.at_most("speed at any time [m/s]", speed, 0.1);
     Ok(())
 }

@@ -201,7 +201,7 @@ pub fn judge_while(
         }
         Law::Swings { link, energy } => {
             checks.at_most("largest gap of a joint over the length of a link", watch.gap / link, GAP);
-            checks.at_most("energy gained over what the swing sets free", watch.gained / energy, GAIN);
+            checks.at_most("energy gained over the potential energy of the swing", watch.gained / energy, GAIN);
         }
         Law::Settles => {
             checks.at_most("bodies outside", scene.escaped(end) as f64, 0.0);
