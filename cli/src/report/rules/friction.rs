@@ -27,9 +27,9 @@ fn block_on_floor(velocity: Vec3, spin: f32, mu: f32) -> World {
 pub(super) fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its distance; Coulomb's law\n\
-         gives v²/(2 mu g) = {:.3} m. The axes of `box` are the tangents of the contact. *Creep* is the distance\n\
-         that a block with mu 0.5 moves in 10 s on a slope of 20°.\n\n\
+        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its sliding distance, which is\n\
+         v²/(2 mu g) = {:.3} m by Coulomb's law. The axes of `box` are the tangents of the contact. *Creep* is the distance that\n\
+         a block with mu 0.5 moves in 10 s on a slope of 20°.\n\n\
          | friction | 0° | 15° | 30° | 45° | largest spread | creep |\n|---|---|---|---|---|---|---|",
         16.0 / (2.0 * 0.4 * 9.81)
     );
@@ -75,9 +75,9 @@ fn creep(rule: &str) -> Result<f64> {
 fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThe block starts at 2 m/s and 5 rad/s. Under Coulomb's law sliding and spinning end together. Friction\n\
-         acts below the center of mass and shifts the load forward, so the path bends. Friction per manifold\n\
-         lacks this effect, and sliding does not weaken its friction against the spin.\n\n\
+        "\nThe block starts at 2 m/s and 5 rad/s. Under Coulomb's law sliding and spinning end together, and the path bends,\n\
+         because friction acts below the center of mass and shifts the load forward. Friction per manifold lacks this effect,\n\
+         and sliding does not weaken its friction against the spin.\n\n\
          | friction | slides for | spins for | distance from its line |\n|---|---|---|---|"
     );
     let mut lines = Vec::new();
