@@ -43,7 +43,7 @@ def judged(run: Settings) -> dict[str, Any]:
     >>> from drystone._families import judged
     >>> result = judged({"family": "slopes", "seed": 1, "settings": {"preset": "fast"}})
     >>> result["passed"], result["bodies"], [check["what"] for check in result["checks"]][-1]
-    (True, 1, 'bodies at NaN or infinity')
+    (True, 1, 'non-finite bodies')
     """
     config = _config(run["settings"])
     return _drystone.judge(str(run["family"]), int(run["seed"]), config._config)

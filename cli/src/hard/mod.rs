@@ -68,7 +68,7 @@ impl Checks {
     /// Passes if every number of a world is finite.
     fn finite(&mut self, what: &str, world: &World) {
         let broken = u8::from(world.first_non_finite().is_some());
-        self.at_most(format!("{what}bodies at NaN or infinity"), broken.into(), 0.0);
+        self.at_most(format!("{what}non-finite bodies"), broken.into(), 0.0);
     }
 
     /// Passes if every body is in place.
