@@ -102,9 +102,9 @@ fn stages(rows: &[FallingRow]) -> String {
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The first time is the least of the stage `run`, the sweeps, per manifold and \
-         pass over all contacts, in parentheses relative to the smallest island. Bytes are the peak of the whole \
-         process. The times of a step and its stages are in ms, with the threads before them.\n\n\
+        "A plane pyramid is one island. The time of the sweeps is the least of the stage `run` per manifold and pass \
+         over all contacts, in parentheses relative to the smallest island. Bytes are the peak of the whole process. \
+         The other times are in ms, on the threads of their row.\n\n\
          | boxes | sweeps, ns per manifold and pass | bytes a box | threads | step | detection | rows | sweeps |\n\
          |--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
