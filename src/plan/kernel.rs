@@ -27,7 +27,7 @@ pub enum Kernel {
     },
     /// Decay of velocities; over bodies.
     DampVelocities {
-        /// As of `IntegrateVelocities`.
+        /// Like in `IntegrateVelocities`.
         from_start: bool,
     },
     /// Free rotation of unequal moments of inertia; over `inertias`.

@@ -1,7 +1,8 @@
 //! The order of work as data: the sequence of kernels and their ranges.
 //!
-//! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm is here
-//! and nowhere else. A plan has no pass for a feature that its scene lacks. Without friction no kernel has friction,
+//! A plan is built once a step from the settings and the problem. Backends only follow it, so the algorithm is nowhere
+//! else. A plan has no pass for a feature that its scene lacks. Without friction no kernel has friction, and without
+//! restitution, torques, damping, unequal moments of inertia or joints there are no passes for them.
 //! and without restitution, torques, damping, unequal moments of inertia or joints there are no passes for them.
 
 mod bytes;
