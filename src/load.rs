@@ -70,7 +70,8 @@ impl Load {
         Self::all(world, config, |_, _| true).into_iter().reduce(deeper)
     }
 
-    /// The interfaces of `world`, in the same manner. `is_wanted` gets the upper body of each and its gap (m).
+    /// The wanted interfaces of `world`, with loads as in [`Self::heaviest`]. `is_wanted` gets the upper body and the
+    /// gap of each (m).
     pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
         let ups: Vec<DMat3> = (0..world.world_count()).map(|part| up(world.gravity_of(part))).collect();
         let up_of = |i: usize| ups[world.bodies.worlds()[i] as usize];
@@ -227,7 +228,7 @@ impl<'a> Ground<'a> {
     fn new(boxes: &'a [Box3], world: &'a World) -> Self {
         let tree = |mut own: Vec<usize>| {
             own.retain(|&i| !boxes[i].is_empty());
-            // parry assumes that the leaves of a tree of one or two are 0 and 1.
+            // parry assumes that a tree with one or two leaves has the leaves 0 and 1.
             let leaves = own.iter().map(|&i| aabb(boxes[i].low, boxes[i].high)).enumerate();
             (Bvh::from_iter(BvhBuildStrategy::Binned, leaves), own)
         };

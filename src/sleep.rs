@@ -1,8 +1,8 @@
 //! Bodies that lie still fall asleep until something disturbs them.
 //!
-//! Bodies that touch, or that a joint connects, form an island. If all bodies of an island were slow for some time, the
-//! whole island falls asleep. Its bodies then keep their exact poses, and no stage of a step works on them. An island
-//! wakes as a whole in one of these cases:
+//! Bodies that touch, or that a joint connects, form an island. If all bodies of an island have been slow for some
+//! time, the whole island falls asleep. Its bodies then keep their exact poses, and no stage of a step works on them.
+//! An island wakes as a whole in one of these cases:
 //!
 //! - An awake body comes near enough to make contact.
 //! - A moving kinematic body touches a body of the island or is connected to it.
@@ -97,8 +97,8 @@ crate::saved::cloned!(Sleep {
     steps,
 } scratch { islands });
 
-/// The overlap from which on a body has to lie still, over the promised sag. Preloads lift resting bodies out of deeper
-/// overlaps.
+/// Overlap, relative to the promised sag, above which a body that still comes out of another stays awake. Preloads lift
+/// resting bodies out of deeper overlaps.
 const DEEP: f32 = 0.25;
 /// A body comes out of another if its present speed ends the overlap within this time (s).
 const COMING_OUT: f32 = 10.0;

@@ -82,8 +82,9 @@ fn add_point(together: ptr<function, Together>, k: u32, point: Point, impulse: f
     (*together).mass = (*together).mass + point.normal_mass;
 }
 
-// Changes the impulses of all points of a manifold together, by steepest descent. The direction has the change that
-// each point needs by itself. The step is the share of it that leaves the least energy in the missing velocities.
+// Changes the impulses of all points of a manifold together, by steepest descent. The direction is the vector of the
+// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
+// still lack.
 fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, together: ptr<function, Together>) {
     let turn_a = cross3((*together).arms_a, contact.normal);
     let turn_b = cross3((*together).arms_b, contact.normal);

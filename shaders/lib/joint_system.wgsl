@@ -4,7 +4,7 @@
 // The smallest pivot of a row, relative to the trace of its block in S: 2^-20.
 const LEAST_PIVOT: f32 = 9.5367431640625e-7;
 
-// The lists of the systems in their common buffer. Its first numbers are the begins of the lists. Layout:
+// The lists of the systems in their common buffer. Its first numbers are the starts of the lists. Layout:
 // src/backend/gpu/rows.rs.
 fn begin_of_system(system: u32) -> u32 { return joint_systems[joint_systems[0] + system]; }
 fn softness_of_system(system: u32) -> f32 { return bitcast<f32>(joint_systems[joint_systems[1] + system]); }

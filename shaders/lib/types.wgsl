@@ -69,11 +69,11 @@ struct Params {
     restitution_threshold: f32, slop: f32, relaxation: f32, tolerance: f32,
     body_count: u32, point_count: u32, joint_count: u32, patches: u32,
     axis_count: u32,
-    // 0. Shader compilers do not know its value, which the exact mode in WGSL relies on.
+    // Always 0. Shader compilers cannot know this, and the exact mode in WGSL relies on it.
     zero: u32,
 }
 
-// The colors that one dispatch sweeps in order, and the substep of their block. The buffer `colors` holds the begin of
+// The colors that one dispatch sweeps in order, and the substep of their block. The buffer `colors` holds the start of
 // each color, then the end of the last, then the rows of the colors.
 struct PassRow {
     first: u32, end: u32,
@@ -89,14 +89,14 @@ struct Preload { movable_compliance: f32, fixed_compliance: f32, share: f32, war
 struct ResidentParams {
     preload: Preload,
     body_count: u32,
-    // Number of contacts that take part, and the begin of their rows in `colors`.
+    // Number of contacts that take part, and the start of their rows in `colors`.
     contact_count: u32, order: u32,
     written_count: u32,
     // 1 if the host sent all points.
     has_points: u32,
     // 1 if friction at points has two directions.
     tangents: u32,
-    // 0. Shader compilers do not know its value, which the exact mode in WGSL relies on.
+    // Always 0. Shader compilers cannot know this, and the exact mode in WGSL relies on it.
     zero: u32,
 }
 

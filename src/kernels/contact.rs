@@ -143,11 +143,11 @@ fn solve_normal<L: Lane>(
     apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
 }
 
-/// Changes the impulses of all points of a manifold together, by steepest descent. The direction has the change that
-/// each point needs by itself. The step is the share of it that leaves the least energy in the missing velocities.
-/// `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. The common
-/// change of all points is one impulse at their middle, and no point takes more than its share because it comes first.
-/// A point may pull after this, until it is solved alone.
+/// Changes the impulses of all points of a manifold together, by steepest descent. The direction is the vector of the
+/// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
+/// still lack. `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. The
+/// common change of all points is one impulse at their middle, and no point takes more than its share because it comes
+/// first. A point may pull after this, until it is solved alone.
 #[inline(always)]
 fn press_as_one<L: Lane>(
     rules: Rules,
@@ -206,7 +206,7 @@ fn press_as_one<L: Lane>(
     pair.b.w += spin_b * share;
 }
 
-/// The velocity that a point lacks, from its `correction` without a bound; 0 without mass.
+/// The velocity that a point lacks, from its unclamped `correction`; 0 if the point has no mass.
 #[inline(always)]
 fn lacking<L: Lane>(point: &Point<L>, correction: L) -> L {
     let zero = L::constant(0.0);
@@ -251,7 +251,7 @@ pub fn summed<L: Lane>(is_first: bool, before: Vec3<L>, now: Vec3<L>) -> Vec3<L>
     if is_first { now } else { before + now }
 }
 
-/// Applies the impulses that a manifold already carries. Kernel `warm_start`.
+/// Applies the carried impulses of a manifold. Kernel `warm_start`.
 #[inline(always)]
 pub fn warm_start<L: Lane>(rules: Rules, pair: &mut Pair<L>, contact: &Contact<L>, rows: &impl PointRows<L>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);

@@ -181,8 +181,8 @@ fn fast_turn<S: Scalar>(
 }
 
 /// Changes the spin of a body with unequal moments of inertia, by the implicit midpoint rule: I (x - w) + h m x I m =
-/// 0, where m is the midpoint spin. It keeps energy and momentum, to 1e-9 over 20 s in f64. Explicit Euler gains
-/// eightfold in that time, and implicit Euler loses most of the energy. The solution takes two Newton steps, or four
+/// 0, where m is the midpoint spin. It keeps energy and momentum, to 1e-9 over 20 s in f64. In that time explicit Euler
+/// multiplies the energy by eight, and implicit Euler loses most of it. The solution takes two Newton steps, or four
 /// for a fast spin, whose energy is also brought back.
 ///
 /// In the principal axes w_x' = a_x w_y w_z and so on, with a_x = (I_y - I_z)/I_x. If each w_i has a suitable unit, the

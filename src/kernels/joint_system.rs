@@ -3,7 +3,7 @@
 //! `apply_joint_changes`.
 //!
 //! A node of a system is up to three rows of one joint: its anchors, its locks and limits of shifts, or those of turns.
-//! Drives are swept (`solve_axes`). So are limits until they have an impulse, from when on they hold like locks. A
+//! Drives are swept (`solve_axes`). Limits are swept until they have an impulse, and hold like locks from then on. A
 //! limit that would pull returns to the sweeps: the solver removes its row and factors the system without it. Arms and
 //! axes turn with their bodies, and the blocks of S with them, so S is factored anew when bodies have moved. The
 //! problem lists the order of elimination, the nonzero blocks, and the products in each block (`JointSystems`).
@@ -17,7 +17,7 @@ use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, tu
 use crate::problem::JointSystems;
 
 /// A block of a matrix, as three columns. Each column has a fourth number, which nothing reads, so that a column of
-/// single numbers fills a register. Only single numbers compute with it ([`Lane::COLUMN`]).
+/// single numbers fills a register. Only columns of single numbers compute with it ([`Lane::COLUMN`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Block<L>([[L; 4]; 3]);
 
@@ -171,7 +171,7 @@ impl<L: Lane> Block<L> {
 }
 
 /// The smallest pivot of a row, relative to the trace of its block in S: 2^-20, above the rounding errors of the
-/// products that are subtracted from a pivot. A smaller pivot is raised to this. It makes corrections too small, never
+/// products that are subtracted from a pivot. A smaller pivot is raised to this, so corrections are too small, never
 /// too large.
 const LEAST_PIVOT: f64 = 9.536_743_164_062_5e-7;
 
@@ -183,8 +183,8 @@ fn inverse_pivot<L: Lane>(pivot: L, own: L, least: L) -> L {
 }
 
 /// The factors l d lᵀ of a pivot, whose diagonal in S was `own`. The result has l below the diagonal, and 1/d on it. In
-/// a missing row, whose diagonal in S is zero, 1/d is zero. A solution by the inverse would lose as many digits as the
-/// stiffness of a pivot varies with the direction. For a lever and its hinge it varies by 1e5.
+/// a missing row, whose diagonal in S is zero, 1/d is zero. A solution by the inverse would lose precision by the ratio
+/// of the stiffnesses of a pivot in different directions, which is 1e5 for a lever and its hinge.
 #[inline(always)]
 pub fn factored_pivot<L: Lane>(pivot: &Block<L>, own: Vec3<L>) -> Block<L> {
     let zero = L::constant(0.0);

@@ -10,8 +10,8 @@
 //! else:                 t_k = (1 + sqrt(1 + 4 t_k-1²))/2,  r_k = x_k + (t_k-1 - 1)/t_k (x_k - x_k-1)
 //! ```
 //!
-//! The first condition is the sharper one: a sweep goes back where momentum continued. In a cycle it may never hold,
-//! and then the second condition ends momentum. Numbers are in docs/convergence.md.
+//! The first condition is the stricter one. It holds when a sweep goes back against the momentum. In a cycle it may
+//! never hold, and then the second condition ends momentum. Numbers are in docs/convergence.md.
 //!
 //! Velocities are linear in the impulses and use the same factor. The result is x_k, so nothing follows the last sweep.
 //! The factor is 0 before the second sweep.

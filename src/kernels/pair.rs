@@ -38,7 +38,7 @@ pub fn relative_movement<L: Lane>(pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) ->
     moved_b - moved_a
 }
 
-/// Records a correction above the tolerance. The impulse is compared with the mass that it moved.
+/// Records whether an impulse changes a velocity by more than the tolerance. `mass` is its effective mass.
 #[inline(always)]
 pub fn note_correction<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L>, impulse: L, mass: L) {
     if rules.measured {

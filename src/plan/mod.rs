@@ -3,7 +3,6 @@
 //! A plan is built once a step from the settings and the problem. Backends only follow it, so the algorithm is nowhere
 //! else. A plan has no pass for a feature that its scene lacks. Without friction no kernel has friction, and without
 //! restitution, torques, damping, unequal moments of inertia or joints there are no passes for them.
-//! and without restitution, torques, damping, unequal moments of inertia or joints there are no passes for them.
 
 mod bytes;
 mod kernel;

@@ -113,7 +113,7 @@ pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rat
     let is_distance = matches!(joint.linear, Linear::Distance(_));
     for (i, is_drive) in kinds(joint) {
         let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
-        // An angle goes on beyond pi, because a place a turn less would be another one.
+        // An angle continues beyond pi. The same angle less a turn would be another position.
         let middle = match (is_drive, axis.drive, axis.bounds) {
             (true, Drive::Spring { target, .. } | Drive::SpringDamper { target, .. }, _) => target,
             (false, _, Bounds::Between { min, max }) => 0.5 * (min + max),
@@ -160,7 +160,7 @@ fn driven(row: AxisRow, drive: Drive, position: f32, h: f32) -> AxisRow {
             let (gap, mass_scale) = (position - target, 1.0 - impulse_scale);
             AxisRow { gap, rate, mass_scale, impulse_scale, max_impulse: largest(max_load, h), ..row }
         }
-        // The effective mass is known once all masses are: [`tune`].
+        // [`tune`] completes the row once all masses are known.
         Drive::SpringDamper { target, max_load, .. } => {
             AxisRow { gap: position - target, impulse_scale: 1.0, max_impulse: largest(max_load, h), ..row }
         }

@@ -49,7 +49,8 @@ impl Written {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Preload {
-    /// Overlap at rest over the impulse of a substep, times the effective mass, of contacts between movable bodies (s).
+    /// Ratio of the overlap at rest to the impulse of a substep, times the effective mass, for contacts between movable
+    /// bodies (s).
     pub movable_compliance: f32,
     /// The same for contacts with bodies that cannot move (s).
     pub fixed_compliance: f32,

@@ -470,7 +470,7 @@ impl ContactRows {
         problem.points.resize(count * stride, PointRow::default());
         problem.impulses.resize(count * stride, ImpulseRow::default());
         if self.sums && problem.totals.is_empty() {
-            // A contact that rests adds nothing: its sums are its impulses.
+            // Contacts at rest are not summed. Their sums are their impulses.
             problem.totals.clone_from(&problem.impulses);
         }
         problem.totals.resize(if self.sums { count * stride } else { 0 }, ImpulseRow::default());

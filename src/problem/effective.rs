@@ -26,7 +26,7 @@ impl InverseMass {
         Self { mass: row.inv_mass, inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]) }
     }
 
-    /// The same as a [`Mass`] of the kernels.
+    /// The same in the form of the kernels.
     fn lane(&self) -> Mass<f32> {
         let Mat3 { x_axis: x, y_axis: y, z_axis: z } = self.inertia;
         let inv_inertia = Sym3 { x: math::vec3(x.x, y.x, z.x), yz: math::vec3(y.y, z.y, z.z) };

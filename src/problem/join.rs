@@ -258,7 +258,7 @@ fn push_systems(one: &JointSystems, begin: Begin, all: &mut JointSystems) {
     if one.is_empty() {
         return;
     }
-    // These systems begin at the end of the systems before.
+    // The end of the systems before is the start of these.
     all.begins.pop();
     all.begins.extend(one.begins.iter().map(|node| node + begin.nodes));
     all.softness.extend_from_slice(&one.softness);

@@ -9,8 +9,8 @@ use super::joint_loads::borne;
 use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, Bounds, Joint, Linear, World};
 
-/// The largest gap that sweeps leave at rest in any of some joints, as a share of the joint's arms. `sides` are the
-/// movable bodies of a joint; `substep` is the length of a substep (s).
+/// The largest gap at rest that sweeps leave in any joint of a set, as a share of the arms of the joint. `sides` are
+/// the movable bodies of a joint; `substep` is the length of a substep (s).
 pub fn gap_of_sweeps(
     joints: &[u32],
     world: &World,
@@ -32,7 +32,7 @@ pub fn gap_of_sweeps(
 }
 
 /// The gap of a swept joint under a force of 1 N, as a share of its arms (1/N); `None` if the joint has no arms or
-/// constrains no distance. `omega` is the angular frequency of the springs that sweeps act as.
+/// restricts no shifts. `omega` is the angular frequency of the springs that sweeps act as.
 fn share_of_force(joint: &Joint, world: &World, omega: f32) -> Option<f32> {
     let bears = match &joint.linear {
         Linear::Axes(axes) => axes.iter().any(|axis| axis.bounds != Bounds::Free),

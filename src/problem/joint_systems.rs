@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 /// Connected sets of joints. Each is solved directly by S = L D Lᵀ, in blocks of 3 x 3.
 #[derive(Debug, Default, PartialEq)]
 pub struct JointSystems {
-    /// The begin of the nodes of each system, and the end of the last.
+    /// The start of the nodes of each system, and the end of the last.
     pub begins: Vec<u32>,
     /// Softness of the joints of each system, relative to the trace of each diagonal block.
     pub softness: Vec<f32>,
@@ -32,8 +32,8 @@ pub struct NodeRow {
     pub first_block: u32,
     /// One past the last block of its column.
     pub end_block: u32,
-    /// Its rows: [`NodeRow::ANCHORS`], or a byte for each row. A byte is 0 without a row; otherwise it is the number of
-    /// an axis among those of the joint plus 1, with the bit `NodeRow::LIMIT` for a limit.
+    /// Its rows: [`NodeRow::ANCHORS`], or a byte for each row. The byte is 0 if the row is missing. Otherwise it is 1
+    /// plus the number of an axis of the joint, with the bit `NodeRow::LIMIT` for a limit.
     pub rows: u32,
 }
 
@@ -234,9 +234,8 @@ impl JointSystems {
     }
 }
 
-/// Softness of joints in loops. Loops may hold bodies more than once, as the joints of a flat sheet do. S is then
-/// singular and determines no impulse. A joint with 2^-14 / 3 yields by 0.04 mm at 1/480 s under 300 times the mass of
-/// a ball.
+/// Softness of joints in loops. Loops may be redundant, as in a flat sheet. S is then singular and determines no
+/// impulse. A joint with 2^-14 / 3 yields by 0.04 mm at 1/480 s under 300 times the mass of a ball.
 const LOOP_SOFTNESS: f32 = 6.103_515_6e-5 / 3.0;
 
 /// Softness of joints in trees with locked angles, 2^-19 / 3, above the rounding errors. In single precision the turn

@@ -140,9 +140,9 @@ impl JointRows {
         self.chosen_for = None;
     }
 
-    /// Chooses the joints that are solved directly, unless they are chosen. The choice lasts, because a swept joint
-    /// leaves a gap that it closes softly; a later direct solution would gain energy from it. `substep` is the length
-    /// of a substep (s).
+    /// Chooses the joints that are solved directly, unless the choice is made already. The choice lasts, because a
+    /// swept joint leaves a gap that it closes softly. A later direct solution would gain energy from this gap.
+    /// `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
         self.gap_of_turns = 0.5 * substep * substep / config.max_joint_gap_share;
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);

@@ -90,7 +90,8 @@ pub struct StepProblem {
     pub impulses: Vec<ImpulseRow>,
     /// Sums of the impulses over the substeps of the step, without peaks; empty unless they are asked for.
     pub totals: Vec<ImpulseRow>,
-    /// Sag of the two bodies of each manifold at rest under its load in the step before, of both together (m).
+    /// Sag of each manifold at rest under its load in the step before, from the masses of its bodies without their
+    /// inertia (m).
     pub sags: Vec<f32>,
     /// Joints. Only the joints in `order` take part.
     pub joints: Vec<JointRow>,
@@ -103,7 +104,7 @@ pub struct StepProblem {
     /// The rows that passes go over, color by color: the contacts and joints that take part, the bodies, the rows of
     /// unequal moments of inertia, the systems of joints that take part, and the rows of turning inertia.
     pub order: Vec<u32>,
-    /// The begin of each color in `order`, and the end of the last.
+    /// The start of each color in `order`, and the end of the last.
     pub colors: Vec<u32>,
     /// The blocks. Their colors follow each other within each of the six kinds of rows.
     pub blocks: Vec<Block>,

@@ -1,8 +1,8 @@
 //! Effective masses, separations and preloads of slots, sixteen slots at a time.
 //!
-//! Memory takes most of the time: each manifold has 160 B of rows and 192 B of points, and two bodies anywhere. The
-//! former state of a reused manifold stands in the order of the slots. To read it from its pair took 36 ns of the 91 ns
-//! of a manifold.
+//! Memory takes most of the time: each manifold has 160 B of rows and 192 B of points, and two bodies at any place. The
+//! former state of a reused manifold is stored in the order of the slots. Reading it from its pair took 36 ns of the 91
+//! ns for each manifold.
 
 #![allow(unsafe_code)]
 

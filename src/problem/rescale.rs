@@ -11,7 +11,7 @@ use crate::world::{BodyKind, World};
 pub struct StepScale {
     /// Length of a substep (s). The impulse of a contact in a substep is its force times this length.
     substep: f32,
-    /// Overlap at rest over impulse, times the effective mass, of contacts between movable bodies (s).
+    /// Ratio of the overlap at rest to the impulse, times the effective mass, for contacts between movable bodies (s).
     movable_compliance: f32,
     /// The same for contacts with bodies that cannot move (s).
     fixed_compliance: f32,

@@ -80,13 +80,12 @@ pub struct TorqueRow {
 }
 
 impl TorqueRow {
-    /// The row of a body without torque. To add negative zero changes no bit of any number, not even of a negative
-    /// zero.
+    /// The row of a body without torque. Adding negative zero changes no bit of any number, not even of negative zero.
     pub const NONE: Self = Self { angular_acceleration: [-0.0; 3], pad: 0.0 };
 }
 
-/// Effect of damping on one body in a substep, 32 B. Besides the plain acceleration, a velocity changes by the gain
-/// less its own product with the loss.
+/// Effect of damping on one body in a substep, 32 B. Besides the plain acceleration, a velocity v changes by the gain
+/// minus the loss times v.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DampingRow {
@@ -105,8 +104,8 @@ pub struct DampingRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct InertiaRow {
-    /// Principal moments of inertia, divided by the power of two (kg m²) in the largest. Only their ratios matter, and
-    /// so no product with spins leaves single precision.
+    /// Principal moments of inertia, divided by the power of two (kg m²) in the largest. Only their ratios matter. The
+    /// scale keeps products with spins within single precision.
     pub principal: [f32; 3],
     /// The body.
     pub body: u32,
@@ -275,10 +274,10 @@ pub struct AxisRow {
     pub speed: f32,
     /// Largest impulse in a substep (N s, N m s).
     pub max_impulse: f32,
-    /// Speed in a substep over the gap, of a spring and of bounds of an axis with a drive (1/s).
+    /// Ratio of the speed in a substep to the gap (1/s), for a spring and for bounds of an axis with a drive.
     pub rate: f32,
-    /// Share of the speed that the row takes away in a substep: of a drive, with 1 for a motor; 1 for bounds of an axis
-    /// with a drive, and 0 for other bounds.
+    /// Share of the speed that a drive takes away in a substep, 1 for a motor. Bounds have 1 on an axis with a drive,
+    /// and 0 on other axes.
     pub mass_scale: f32,
     /// Share of the impulse that a spring gives back; 0 for other rows.
     pub impulse_scale: f32,
@@ -358,7 +357,7 @@ crate::saved::fields!(ImpulseRow { normal, tangent_1, tangent_2, peak });
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Softness {
-    /// Wanted velocity over overlap (1/s).
+    /// Ratio of the wanted velocity to the overlap (1/s).
     pub bias_rate: f32,
     /// Share of the effective mass that acts.
     pub mass_scale: f32,
@@ -374,7 +373,8 @@ impl Softness {
         Self { bias_rate, mass_scale: 1.0, impulse_scale: 0.0, push_limit }
     }
 
-    /// Overlap at rest over the impulse of a substep, times the effective mass (s); 0 of a rigid constraint.
+    /// Ratio of the overlap at rest to the impulse of a substep, times the effective mass (s); 0 for a rigid
+    /// constraint.
     pub fn compliance(&self) -> f32 {
         if self.impulse_scale > 0.0 { self.impulse_scale / (self.mass_scale * self.bias_rate) } else { 0.0 }
     }
@@ -386,7 +386,7 @@ impl Softness {
 pub struct Params {
     /// A slower approach does not bounce (m/s).
     pub restitution_threshold: f32,
-    /// Overlap that remains (m).
+    /// Overlap that sweeps leave (m).
     pub slop: f32,
     /// Factor on every correction.
     pub relaxation: f32,
@@ -402,7 +402,7 @@ pub struct Params {
     pub patches: u32,
     /// Number of axes of joints.
     pub axis_count: u32,
-    /// 0. Shader compilers do not know its value, which the exact mode in WGSL relies on.
+    /// Always 0. Shader compilers cannot know this, and the exact mode in WGSL relies on it.
     pub zero: u32,
     #[doc(hidden)]
     pub pad: [u32; 2],

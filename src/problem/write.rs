@@ -278,7 +278,7 @@ impl Writer<'_> {
     }
 }
 
-/// The index that the point `k` of a manifold had among the former points of its slot.
+/// The index that the point `k` of a manifold had among the former points of its slot; `None` for a new point.
 pub(super) fn point_before(write: Write, k: usize, point: &ManifoldPoint) -> Option<u8> {
     match write {
         Write::Separations | Write::Rows => Some(k as u8),

@@ -48,7 +48,7 @@ const SLIP: f64 = 0.02;
 const UNBALANCED: f64 = 1e-4;
 /// Stiffness against motions that no point resists, relative to the largest stiffness.
 const NO_RESISTANCE: f64 = 1e-10;
-/// Most rounds that let go of points and limit friction.
+/// Most rounds of letting go of points and limiting friction.
 const ROUNDS: usize = 24;
 /// Forces below this share of the largest force are rounding errors.
 const ROUNDING: f64 = 1e-9;

@@ -23,7 +23,7 @@ use bearing::{Balance, Point, Wrench};
 
 /// Smallest rise of the normal of a supporting contact, as the sine of its angle from the horizontal.
 const LEAST_RISE: f64 = 0.01;
-/// Most rounds that let go of bodies on falling bodies.
+/// Most rounds in which bodies that rest on falling bodies are let go.
 const ROUNDS: usize = 16;
 
 /// Gives impulses and preloads at rest to the contacts of new bodies, and to those that carry them. The rows must be
@@ -57,7 +57,7 @@ struct Bearing {
     sign: f64,
 }
 
-/// The bodies that lie, and the contacts that support them.
+/// The bodies that rest on others, and the contacts that support them.
 struct Structure {
     /// The contacts, grouped by upper body.
     bearings: Vec<Bearing>,
@@ -91,7 +91,7 @@ impl Structure {
         let bearing = |&row: &u32| {
             let gravity =
                 gravity_at(problem.contacts[row as usize].body_a).filter(|gravity| *gravity != DVec3::ZERO)?;
-            // Gravity accelerates a free body beyond this speed in a substep, so a slower body has a support.
+            // A free body reaches this speed in a substep, so a slower body has a support.
             bearing(row, gravity, gravity.length() * f64::from(substep), problem)
         };
         let mut bearings: Vec<Bearing> = contacts.coloring.order.iter().filter_map(bearing).collect();

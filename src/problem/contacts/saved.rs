@@ -1,9 +1,9 @@
 //! The rows of contacts as bytes.
 //!
 //! The slots follow from the manifolds, and the rows from manifolds, materials and masses. A row is saved as it is only
-//! if these may have changed since it was written. Most often they are the effective masses of bodies with unequal
-//! moments, which turned. Builds for tests also write the other rows again when they save, and compare all bits. The
-//! rest of the saved state is impulses, preloads, sags and needs.
+//! if these may have changed since it was written. In most cases only the effective masses have changed, of bodies with
+//! unequal moments that turned. Builds for tests also write the other rows again when they save, and compare all bits.
+//! The rest of the saved state is impulses, preloads, sags and needs.
 
 mod loads;
 mod slots;
@@ -273,8 +273,8 @@ impl Buffers {
         let patch = points.len() - MAX_POINTS;
         let count = contact.point_count as usize + patch;
         let own = points[..count].iter().zip(&self.points[i * points.len()..]);
-        // Every step writes separations and approach velocities anew, and the friction of points too if it has the slip
-        // direction.
+        // Every step writes separations and approach velocities anew, and with slip friction also slips and tangential
+        // masses.
         let slip = |point: &PointRow| if slips { [0; 2] } else { [point.slip_1, point.slip_2].map(f32::to_bits) };
         let arms = |point: &PointRow| ([point.r_a, point.r_b].map(|r| r.map(f32::to_bits)), slip(point));
         let masses =
