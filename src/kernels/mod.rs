@@ -2,7 +2,8 @@
 //!
 //! `pair`, `contact`, `friction` and `joint` are the twins of the files of the same names in `shaders/lib`, and of the
 //! kernels that sweep constraints. `integrate` has the twins of kernels over bodies, and `convergence` and `momentum`
-//! those of kernels between sweeps. Both languages express branches on data by `select` and branches on rules by `if`.
+//! those of kernels between sweeps. Branches on data are `select`s with few exceptions, and branches on rules are plain
+//! `if`s, here and in WGSL.
 
 pub mod axis;
 pub mod contact;

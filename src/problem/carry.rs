@@ -16,7 +16,7 @@ pub struct Carry {
     pub on_device: bool,
     /// The contacts whose rows were written again since, in ascending order.
     pub written: Vec<Written>,
-    /// Whether the device computes more than separations for reused points: approach velocities and slip.
+    /// Whether approach velocities and slips of reused points also follow the bodies, besides their separations.
     pub approach: bool,
     /// Whether friction at points has two directions.
     pub tangents: bool,

@@ -100,7 +100,6 @@ impl Materials {
     }
 }
 
-/// Slots in one task.
 const SLOTS_A_TASK: usize = 4096;
 
 impl ContactRows {

@@ -23,7 +23,6 @@ pub(super) enum Write {
 
 crate::saved::kinds!(Write { Separations, Rows, Computed, New });
 
-/// One slot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     /// World of the pair.
@@ -57,7 +56,7 @@ impl Slot {
 #[derive(Debug, Default)]
 pub(super) struct Slots {
     pub all: Vec<Slot>,
-    /// The edges that the graph colors, one a slot.
+    /// The edges that the graph colors, one for each slot.
     pub edges: Vec<Edge>,
     /// The colliders of each slot, by their indices among those of their bodies a and b.
     pub colliders: Vec<[u32; 2]>,

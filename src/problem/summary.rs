@@ -17,7 +17,6 @@ pub struct ContactSummary {
     pub points: Vec<usize>,
 }
 
-/// Contacts in one task.
 const CONTACTS_A_TASK: usize = 2048;
 
 impl ContactSummary {

@@ -58,7 +58,6 @@ pub(super) struct SlotRows<'a> {
     pub jams: &'a mut [bool],
 }
 
-/// Slots in one task.
 pub(super) const SLOTS_A_TASK: usize = 256;
 
 /// Some of the slots of a task, in ascending order.

@@ -279,7 +279,6 @@ fn arms(row: &PointRow, bearing: &Bearing) -> (DVec3, DVec3) {
     if bearing.sign > 0.0 { (b, a) } else { (a, b) }
 }
 
-/// The rows of the points of a contact.
 fn points_of_row<'a, T>(contact: &ContactRow, rows: &'a [T]) -> &'a [T] {
     &rows[contact.first_point as usize..][..contact.point_count as usize]
 }

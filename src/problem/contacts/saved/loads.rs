@@ -21,7 +21,6 @@ pub(super) enum Rows {
     All,
 }
 
-/// The columns of slots.
 const BITS: usize = 0;
 const LOADED: usize = 1;
 const NORMAL: usize = 2;
