@@ -37,7 +37,7 @@ pub trait Lane:
     fn constant(x: f64) -> Self;
     /// Whether `self > other`; false for NaN.
     fn gt(self, other: Self) -> Self::Mask;
-    /// Both.
+    /// Whether both masks are true.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// The same truth value in every lane.
     fn mask(value: bool) -> Self::Mask;

@@ -30,7 +30,7 @@ thread_local! {
 }
 
 /// Calls `with` for each convex part of a shape (the whole of a convex one, each triangle of a mesh or height field)
-/// that is nearer than `within` (m) to a convex shape `moving`. Triangles come in an order that the mesh decides.
+/// that is nearer than `within` (m) to a convex shape `moving`. The mesh determines the order of triangles.
 pub(crate) fn clearances(
     (fixed, pose): (&Shape, &Pose),
     (moving, own): (&Shape, &Pose),

@@ -104,7 +104,7 @@ pub(super) struct BodyWork<'a> {
     pub free: Shared<'a, Row8>,
     /// Acceleration, then angular acceleration.
     pub accelerations: &'a [Row8],
-    /// Rows of damping; none where no body is damped.
+    /// Rows of damping; empty if no body is damped.
     pub dampings: &'a [Row8],
 }
 
