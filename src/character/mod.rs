@@ -208,7 +208,7 @@ impl Character {
         let Some(ground) = self.ground else {
             return self.fly(around, start, self.drift, (walk, gravity), dt);
         };
-        // The ground carries it along, through all obstacles.
+        // The ground carries it along, past all other obstacles.
         let carried = around.carried(start);
         let drift = carried / dt;
         let from = if carried == Vec3::ZERO {

@@ -21,7 +21,7 @@ const SLOPE: f32 = 1e-4;
 const PIECES: u32 = 24;
 /// Shares of the way out of an overlap, tried in this order. With a share of 0, every set of planes has a solution.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.0];
-/// Length of the rest of a unit vector, within all planes, up to which the planes hold the vector.
+/// Planes hold a unit vector if they leave less than this length of it.
 const HELD: f64 = 1e-3;
 
 /// A plane between the character and a collider near it.

@@ -207,8 +207,8 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     ways
 }
 
-/// Moves bodies, then factors the joints of all systems and solves them twice: the second time at the corrections that
-/// the first one left.
+/// Moves bodies, then factors the joints of all systems and solves them twice. The second solution starts from the
+/// corrections of the first.
 fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
     let (turn, factor) = (Kernel::TurnInertias, Kernel::BeginSystems);
     let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };
