@@ -16,7 +16,7 @@ pub fn interleave<T>(
     (0..rounds).try_for_each(|round| participants.iter_mut().try_for_each(|participant| turn(round, participant)))
 }
 
-/// The thirds of a run, in turns: the windows that a page shows.
+/// The thirds of a run, as ranges of turns.
 pub fn thirds(turns: usize) -> [Range<usize>; 3] {
     std::array::from_fn(|k| k * turns / 3..(k + 1) * turns / 3)
 }
