@@ -31,7 +31,8 @@ pub trait Lane:
 {
     /// The result of a comparison of two lanes.
     type Mask: Copy;
-    /// Number of kept numbers in a column of three. With one more, a column of single numbers fills a register.
+    /// Number of values to compute in a column of three. A fourth value lets a column of single numbers fill a
+    /// register.
     const COLUMN: usize = 3;
     /// The same constant in every lane.
     fn constant(x: f64) -> Self;

@@ -47,7 +47,7 @@ pub(super) enum Footing {
     Feet,
     /// Surfaces up to a step above this height (m).
     Level(f32),
-    /// In the air: surfaces on which it would stand without legs.
+    /// In the air: surfaces that are level at the contact itself, without a step height.
     Air,
 }
 

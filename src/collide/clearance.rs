@@ -1,4 +1,4 @@
-//! How far a convex shape is apart from other shapes, and along which directions.
+//! Distances of a convex shape from other shapes, and the directions of these distances.
 
 use std::cell::RefCell;
 

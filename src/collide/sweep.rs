@@ -215,7 +215,7 @@ impl Until {
     }
 }
 
-/// The time of impact of two shapes, of which at most one is a mesh or height field. `size` sets the tolerance of
+/// The time of impact of two shapes. At most one of them is a mesh or height field. `size` sets the tolerance of
 /// lengths: half of the smallest side of the moving shape. If `is_one_sided`, only those sides of meshes and height
 /// fields count that face the center of the other body at the start of the step.
 pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: bool) -> Option<Impact> {

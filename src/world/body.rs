@@ -848,7 +848,7 @@ impl Body {
         if self.has_fixed_rotation() || size <= 0.0 {
             return Mat3::ZERO;
         }
-        // By their size, so that no product leaves the range of numbers. A locked axis is put apart from the others.
+        // Scale by the size, so that no product overflows. Separate locked axes from the others.
         let mut inertia = self.mass.world_inertia(self.rotation).as_dmat3() * size.recip();
         let locked = (0..3).filter(|&k| self.locked_rotations[k]);
         for k in locked.clone() {

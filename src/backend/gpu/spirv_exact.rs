@@ -1,9 +1,9 @@
 //! Exact mode in SPIR-V: every sum and product has to be computed as written.
 //!
 //! Plain WGSL allows drivers to reassociate and to fuse. Software Vulkan turns `v + (x y - z w)` into `(v + x y) - z
-//! w`, and after four sweeps nearly every body differs in its last bits. With `NoContraction` on every arithmetic
-//! result it does not, at the same speed, and the GPU agrees with the reference to the last bit. Naga does not write
-//! this decoration, so this module adds it to naga's output.
+//! w`, and after four sweeps nearly every body differs in its last bits. The decoration `NoContraction` on every
+//! arithmetic result prevents this at the same speed, and the GPU agrees with the reference to the last bit. Naga does
+//! not write it, so this module adds it to naga's output.
 
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
