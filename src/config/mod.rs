@@ -124,8 +124,8 @@ pub struct SolverConfig {
     /// something disturbs them.
     pub sleep_after: f32,
     /// Speed of the fastest point of a body below which the body is slow (m/s). A pile of 5,000 falls asleep 7 s after
-    /// it came to rest, with a mean overlap of 0.166 mm, where it has 0.161 mm awake. At 5 mm/s a few rattling bodies
-    /// keep it awake.
+    /// it came to rest, with a mean overlap of 0.166 mm instead of 0.161 mm awake. At 5 mm/s a few rattling bodies keep
+    /// it awake.
     pub sleep_speed: f32,
     /// Colors with fewer constraints than this are swept one after another in one workgroup, instead of one dispatch
     /// each.

@@ -65,7 +65,7 @@ pub trait ContactHooks: Send {
 
     /// Changes a contact before the step solves it: its friction, its restitution, and which of its points act. Each
     /// step calls it for every contact of an awake body, even if the surfaces are only near, with the values from the
-    /// materials. A contact with dropped points is computed anew in every step, and comes to rest less well than a
+    /// materials. A contact with dropped points is computed anew in every step, and does not come to rest as well as a
     /// reused contact.
     fn modify(&mut self, world: &World, contact: &mut PendingContact) {
         let _ = (world, contact);

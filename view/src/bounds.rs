@@ -133,7 +133,7 @@ mod tests {
     fn one_of_many_that_flew_off_is_left_out_with_its_joints() {
         let radius = Bounds::of(&row(20, 0.0)).radius();
         assert!(length(&row(20, 1e4), radius) < 20.0);
-        // Bodies stay in the bounds if they are nearer than four radii, or one of few bodies.
+        // A body stays in the bounds if it is nearer than four radii, or if there are few bodies.
         assert!(length(&row(20, 25.0), radius) > 40.0);
         assert!(length(&row(9, 1e4), radius) > 1e4);
         assert!(length(&row(20, 1e4), f32::INFINITY) > 1e4);

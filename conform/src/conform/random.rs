@@ -164,7 +164,7 @@ fn solve_at_once(random: &mut Random, problem: &mut StepProblem, joints: &[u32])
     }
 }
 
-/// The same problem with all velocities, forces, impulses and distances scaled by `scale`.
+/// The same problem with all velocities, accelerations, impulses, separations and gaps scaled by `scale`.
 pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     let scale = |x: &mut f32| *x *= scale;
     for row in &mut problem.bodies {
@@ -307,7 +307,7 @@ fn contact_row(random: &mut Random, [body_a, body_b]: [u32; 2], first_point: u32
     row
 }
 
-/// Damping of some bodies: of no velocity, of one, or of both.
+/// The damping of a body: of no velocity, of one, or of both.
 fn damping_row(body: u32) -> DampingRow {
     let mut row = DampingRow::default();
     if is_movable(body) && !body.is_multiple_of(4) {

@@ -10,7 +10,7 @@ use super::*;
 use crate::collide::testing::Random;
 
 impl Random {
-    /// A rotation by quarter turns plus a tiny rotation, or no tiny one.
+    /// A rotation by quarter turns, mostly with a tiny rotation in addition.
     fn nearly_right(&mut self) -> Quat {
         let quarter = |x: f32| (3.0 * x) as i32 as f32 * std::f32::consts::FRAC_PI_2;
         let right = Vec3::new(self.next(), self.next(), self.next()).to_array().map(quarter);
