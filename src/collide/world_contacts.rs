@@ -68,7 +68,6 @@ pub(super) struct WorldContacts {
     pub(super) tree: Tree,
     /// The half-spaces, without sensors.
     pub(super) planes: Vec<Plane>,
-    /// The sensors.
     pub(super) sensors: Vec<u32>,
     /// Memory of [`WorldContacts::sense`].
     pub(super) strayed: Vec<u32>,

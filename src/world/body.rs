@@ -823,7 +823,6 @@ impl Body {
         a.material_of(colliders[0]).combine(b.material_of(colliders[1]))
     }
 
-    /// The material of a collider.
     fn material_of(&self, collider: u32) -> Material {
         self.colliders.get(collider as usize).and_then(|c| c.material).unwrap_or(self.material)
     }

@@ -22,7 +22,6 @@ use crate::problem::StepProblem;
 pub(super) struct ImpulsePlace {
     /// The index of its sixteen impulses.
     pub row: u32,
-    /// Its lane.
     pub lane: u32,
 }
 

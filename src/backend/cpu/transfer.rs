@@ -198,7 +198,6 @@ fn first_eight<L: Lanes>(rows: &[&[f32]; WIDTH]) -> [Wide; 8] {
     stored(unsafe { L::columns(&addresses) })
 }
 
-/// The last eight.
 #[inline(always)]
 fn last_eight<L: Lanes>(rows: &[&[f32]; WIDTH]) -> [Wide; 8] {
     let addresses = lanes!(lane => rows[lane][rows[lane].len() - 8..].as_ptr());

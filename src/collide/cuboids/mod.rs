@@ -25,7 +25,6 @@ use crate::lanes::{InstructionSet, Row8, WIDTH};
 /// Two cuboids to test.
 #[derive(Clone, Copy)]
 pub(super) struct CuboidPair {
-    /// The bodies.
     pub bodies: [u32; 2],
     /// Indices in the list of cuboids.
     pub cuboids: [u32; 2],

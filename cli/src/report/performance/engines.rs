@@ -25,7 +25,6 @@ fn thirds<'a>(rows: &'a [WindowRow], scene: &str, threads: usize, setting: &str)
     rows.iter().filter(|r| (&*r.scene, r.threads, &*r.setting) == (scene, threads, setting)).collect()
 }
 
-/// Numbers in one cell.
 fn cell(numbers: impl Iterator<Item = f64>) -> String {
     numbers.map(number).collect::<Vec<_>>().join(", ")
 }
