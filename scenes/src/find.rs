@@ -127,7 +127,7 @@ impl Scene {
     }
 }
 
-/// Reads a scene file. The error says that there is neither a scene nor a file of that name.
+/// Reads a scene file. If the name is unknown, the error suggests a scene.
 fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
     let path = Path::new(name_or_path);
     if !path.is_file() && path.extension().is_none_or(|e| e != "json") {

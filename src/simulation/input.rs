@@ -24,7 +24,7 @@ pub struct StepInput {
 crate::saved::fields!(StepInput { dt, change, config, woken, hash });
 
 impl StepInput {
-    /// Makes the caller's changes in a simulation that stands before the step.
+    /// Makes the caller's changes in a simulation before the step.
     ///
     /// # Errors
     /// The settings contradict each other.

@@ -87,7 +87,7 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Spawner")]
 pub struct SpawnerFile {
-    /// The body at its start; it can say when it leaves.
+    /// The body at its start. Its key `leaves` determines when it leaves.
     pub body: BodyFile,
     /// Steps before the first body.
     #[serde(default)]
@@ -108,7 +108,7 @@ pub struct LeavesFile {
     /// Its center of mass is below this height (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub below: Option<f64>,
-    /// This time is over (s), 0 or more.
+    /// Its age has reached this time (s), 0 or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<f64>,
 }
