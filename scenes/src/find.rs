@@ -35,8 +35,8 @@ impl Scene {
     }
 
     /// `count` worlds of a scene in one world; bodies of different worlds never meet: see
-    /// [`World::beside`](drystone::World::beside). All worlds are equal. With `vary`, that parameter is one larger in each
-    /// world than in the one before.
+    /// [`World::beside`](drystone::World::beside). All worlds are equal. With `vary`, that parameter is one larger in
+    /// each world than in the one before.
     ///
     /// ```
     /// let towers = drystone_scenes::Scene::find_worlds("tower", &["n=4".into()], 3, Some("n"))?;

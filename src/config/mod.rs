@@ -254,7 +254,8 @@ impl SolverConfig {
         Self { sleep_after: 0.0, ..self }
     }
 
-    /// Deepest that a contact may sag under a lasting load (m); `size` is the smallest half extent of the thinner shape (m).
+    /// Deepest overlap that a contact may have under a lasting load (m). `size` is the smallest half extent of the
+    /// thinner shape (m).
     pub fn promised_sag(&self, size: f32) -> f32 {
         let share = self.max_penetration_share * size;
         if self.max_penetration > 0.0 { share.min(self.max_penetration) } else { share }

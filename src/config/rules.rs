@@ -33,7 +33,8 @@ pub enum Friction {
 
 kinds!(Friction { None, Box, Disc });
 
-/// The friction rule that a kernel applies: one of [`Friction`], or the rule for comparison [`ComparisonRules::slip_friction`].
+/// The friction rule that a kernel applies: one of [`Friction`], or the rule for comparison
+/// [`ComparisonRules::slip_friction`].
 ///
 /// ```
 /// use drystone::{SolverConfig, config::FrictionRule};

@@ -369,7 +369,8 @@ mod tests {
         assert!(!passes(&judged(&scene, &law)), "the floor is gone");
     }
 
-    /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+    /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of
+    /// 20, 1 of 29.
     #[test]
     fn intervals_are_those_of_the_literature() {
         for (passed, count, [least, most]) in [

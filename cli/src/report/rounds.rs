@@ -26,7 +26,8 @@ pub fn quartiles(turns: &[f64]) -> [f64; 3] {
     [0.25, 0.5, 0.75].map(|q| quantile(turns, q))
 }
 
-/// Processor time of this process for one thread, which depends less on other processes; wall time for several threads and the GPU.
+/// Processor time of this process for one thread, which depends less on other processes; wall time for several threads
+/// and the GPU.
 pub struct Clock {
     processor: bool,
     start: Instant,

@@ -1,4 +1,5 @@
-//! The section of docs/convergence.md on other solvers: a table of times, and performance profiles (Dolan and Moré 2002).
+//! The section of docs/convergence.md on other solvers: a table of times, and performance profiles (Dolan and Moré
+//! 2002).
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

@@ -34,8 +34,8 @@ pub fn every_rules() -> Vec<Rules> {
             // Velocities since the start of the step are combined with every sum of velocities without the rules below.
             let plain = rules.accumulated && !(rules.friction_first || rules.round || rules.measured || rules.driven);
             // Equal moments of inertia are combined with every impulse without the rules above. Without friction,
-            // `friction_first` makes no difference. Belts drive only points. Belts and repeated passes are not combined with all other
-            // rules again.
+            // `friction_first` makes no difference. Belts drive only points. Belts and repeated passes are not combined
+            // with all other rules again.
             let drivable = matches!(friction, FrictionRule::Box | FrictionRule::Disc)
                 && rules.accumulated
                 && !(rules.patch || rules.round || rules.measured);

@@ -149,7 +149,8 @@ impl<'a> Solver<'a> {
                 Work::Exact(reference) => reference.advance(&self.problem, &plan.passes),
                 Work::Rounded(backend) => backend.run(&mut self.problem, &plan.passes)?,
             }
-            // Right after a restart, the result does not depend on the velocities of the sweep before: it is a new start, too.
+            // Right after a restart, the result does not depend on the velocities of the sweep before: it is a new
+            // start, too.
             let is_new = self.since == if self.method == Method::Plain { DRIFT_SWEEPS } else { LONGEST_MOMENTUM };
             if is_new {
                 self.since = 0;

@@ -195,7 +195,8 @@ impl<'a> SharedFactors<'a> {
         let (nodes, blocks) = (systems.nodes_of(system).len(), systems.blocks_of_system(system).len());
         let nodes = group.first_node..group.first_node + nodes;
         let blocks = group.first_block..group.first_block + blocks;
-        // SAFETY: the caller's promise; groups have nodes and blocks of their own. Nodes and blocks of lanes consist of nothing but lanes.
+        // SAFETY: the caller's promise; groups have nodes and blocks of their own. Nodes and blocks of lanes consist of
+        // nothing but lanes.
         unsafe {
             SystemFactors {
                 nodes: as_lanes(&self.wide_nodes, nodes),

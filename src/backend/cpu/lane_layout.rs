@@ -202,7 +202,8 @@ impl<C: Constraint> LaneLayout<C> {
                     if lane == 0 {
                         (open[kind], next) = (next, next + 1);
                     }
-                    // SAFETY: the groups of a cell begin where those of the cell before end, and tasks have different cells.
+                    // SAFETY: the groups of a cell begin where those of the cell before end, and tasks have different
+                    // cells.
                     let group = unsafe { &mut groups.slice(open[kind]..open[kind] + 1)[0] };
                     if lane == 0 {
                         (group.first, group.count) = (next_impulse, kind as u32 + 1 + patch);

@@ -155,8 +155,8 @@ pub fn bench(
     Ok(Bench { machine: Machine::this(), rows })
 }
 
-/// A simulation of a scene at rest, the hash of the scene and the length of its steps (s). Bodies fall into a container at one
-/// substep. Then preloads and warm starts settle at the measured settings.
+/// A simulation of a scene at rest, the hash of the scene and the length of its steps (s). Bodies fall into a container
+/// at one substep. Then preloads and warm starts settle at the measured settings.
 fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, Spawners, String, f32)> {
     let scene = Scene::find_spec(spec)?;
     let (hash, dt, falls) = (content_hash(&scene), scene.dt, scene.container.is_some());

@@ -44,7 +44,8 @@ impl Survey<'_> {
     /// Runs the scenes and problems that have no rows in the folder, and adds rows after each of them. `progress` gets
     /// the name, the completed work and the total work.
     ///
-    /// A scene is finished if one run has rows of every contender, with the same scene, steps, program, machine and threads.
+    /// A scene is finished if one run has rows of every contender, with the same scene, steps, program, machine and
+    /// threads.
     pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&str, u64, u64)) -> Result<Report> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
         let mut table = Table::<Row>::open(self.out.join(SCENES))?;
@@ -217,8 +218,8 @@ impl Report {
         Ok(Self { results, solves })
     }
 
-    /// Writes `index.html`, `speed-against-error.svg` and, with other engines, `equal-error.md` into the folder and returns the path of the
-    /// page.
+    /// Writes `index.html`, `speed-against-error.svg` and, with other engines, `equal-error.md` into the folder and
+    /// returns the path of the page.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let page = page::page(&self.results, &self.solves)?;
         let path = folder.join("index.html");

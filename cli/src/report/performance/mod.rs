@@ -65,7 +65,8 @@ fn rows<R: DeserializeOwned>(folder: &Path, name: &str) -> Result<Vec<R>> {
     Ok(rows)
 }
 
-/// Writes `performance.md` and `performance/engines.svg` into a directory, from the CSV files in its folder `performance`.
+/// Writes `performance.md` and `performance/engines.svg` into a directory, from the CSV files in its folder
+/// `performance`.
 pub fn performance(directory: &Path) -> Result<()> {
     let folder = directory.join("performance");
     let rows = Rows::read(&folder)?;
