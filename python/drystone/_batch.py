@@ -198,8 +198,8 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Hits:
-    """First hits of rays: `body` [w, R] (-1 without a hit), `distance` [w, R] (m; infinite without a hit), `normal` [w,
-    R, 3] (NaN without a hit).
+    """First hits of rays: `body` [w, R] (-1 without a hit), `distance` [w, R] (m; infinite without a hit), and
+    `normal` [w, R, 3] (NaN without a hit).
     """
 
     body: NDArray[np.int64]
