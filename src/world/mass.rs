@@ -66,7 +66,8 @@ impl MassProperties {
         Self { mass, center, ..Self::IMMOVABLE }
     }
 
-    /// Those of two things that are one body: the sum of the masses, their common center, and the inertia of both about it.
+    /// The mass properties of two parts of one body: the sum of their masses, their common center of mass, and the
+    /// inertia of both about it.
     ///
     /// ```
     /// use drystone::{MassProperties, glam::Vec3};
@@ -92,7 +93,7 @@ impl MassProperties {
         Self { mass: mass as f32, center: center.as_vec3(), principal_inertia, principal_frame }
     }
 
-    /// Refuses a mass that cannot be added to that of shapes.
+    /// Refuses a mass that cannot be added to the mass of shapes.
     pub(super) fn check_additional(&self) -> Result<()> {
         let Self { mass, principal_inertia, .. } = *self;
         let moments = principal_inertia.to_array();

@@ -126,7 +126,7 @@ impl World {
     }
 
     /// Adds a body to the last world and returns its index. [`World::insert`] returns its handle instead. If bodies are
-    /// removed, an index does not tell a body from the next body at the same index.
+    /// removed, an index does not distinguish a body from the next body at the same index.
     pub fn add(&mut self, body: Body) -> usize {
         self.insert(body).index()
     }

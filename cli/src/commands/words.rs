@@ -1,4 +1,4 @@
-//! Enums of the library as argument values: their names, and one line of help for each.
+//! Enums of the library as argument values, each with its name and one line of help.
 
 use std::str::FromStr;
 

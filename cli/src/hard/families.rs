@@ -20,7 +20,7 @@ pub struct Judged {
     pub checks: Vec<Check>,
     /// Processor time of the median step, divided by the number of movable bodies (ms).
     pub ms: f64,
-    /// Processor time of all steps over the time of the world (s a second).
+    /// Processor time of all steps divided by the simulated time (s/s).
     pub seconds: f64,
 }
 
@@ -157,10 +157,10 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
     judge_while(scene, law, setup, |_, _| Ok(()))
 }
 
-/// The same, with a look at each step, whose time does not count.
+/// The same, but calls `look` after each step. The time of these calls does not count.
 ///
 /// # Errors
-/// The scene cannot be run, or `look` ends the run.
+/// The scene cannot be run, or `look` returns an error, which ends the run.
 pub fn judge_while(
     scene: &Scene,
     law: &Law,
@@ -369,7 +369,8 @@ mod tests {
         assert!(!passes(&judged(&scene, &law)), "the floor is gone");
     }
 
-    /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+    /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of
+    /// 20, 1 of 29.
     #[test]
     fn intervals_are_those_of_the_literature() {
         for (passed, count, [least, most]) in [

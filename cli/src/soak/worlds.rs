@@ -16,7 +16,6 @@ pub const WORLDS: &[(&str, &str)] = &[
     ("conveyor", "boxes that come onto rollers, ride along and leave"),
 ];
 
-/// Their names.
 pub const NAMES: [&str; WORLDS.len()] = {
     let mut names = [""; WORLDS.len()];
     let mut i = 0;

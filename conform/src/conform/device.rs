@@ -203,8 +203,8 @@ fn same_worlds(a: &Warm, b: &Warm) -> std::result::Result<(), Failure> {
     BodyDifference::first(&a.simulation.world, &b.simulation.world).map_or(Ok(()), |first| failed!("{first}"))
 }
 
-/// Fails unless a run is as near to the reference as a few steps of plain WGSL; in exact mode it needs the same bits.
-/// The median body counts: if surfaces just touch, rounding decides whether a contact is stiff or soft, and that
+/// Fails unless a run is as near to the reference as a few steps of plain WGSL are. In exact mode it needs the same
+/// bits. The median body counts: if surfaces just touch, rounding decides whether a contact is stiff or soft, and that
 /// affects few bodies.
 fn near(run: &Run, ours: &Warm, theirs: &Warm) -> std::result::Result<(), Failure> {
     if run.is_exact() {

@@ -454,7 +454,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::word("kind", &Family::NAMES, "family of worlds"),
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of all that is drawn"),
         ],
-        // Only drawing the world tells the number: at most a few hundred.
+        // Only a drawn world has this number. It is at most a few hundred.
         bodies: |v| families::drawn(v[0] as usize, v[1] as u64).map_or(0.0, |scene| scene.world.dynamic_count() as f64),
         build: |v| families::drawn(v[0] as usize, v[1] as u64),
     },

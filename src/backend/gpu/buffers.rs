@@ -65,7 +65,6 @@ impl Buffers {
         }
     }
 
-    /// The buffer of a binding.
     pub fn get(&self, binding: Binding) -> &wgpu::Buffer {
         self.slots[binding as usize].buffer.as_ref().expect("every buffer is made before a kernel is bound")
     }

@@ -1,4 +1,4 @@
-//! A paragraph a finding, with the figures of the rows.
+//! One paragraph for each finding, with figures from the rows.
 
 use std::fmt::Write as _;
 
@@ -32,7 +32,7 @@ fn on(threads: usize) -> String {
     if threads == 1 { "one thread".into() } else { format!("{threads} threads") }
 }
 
-/// The least and the largest number, as text.
+/// The smallest and the largest number, as text.
 fn range(numbers: impl Iterator<Item = f64> + Clone) -> String {
     let (low, high) = (numbers.clone().fold(f64::INFINITY, f64::min), numbers.fold(0.0, f64::max));
     format!("{} to {}", number(low), number(high))
@@ -47,7 +47,7 @@ fn beside(rows: &[WindowRow]) -> String {
             most.map_or_else(String::new, |(_, r)| format!(", most in {}, steps {} to {}", r.scene, r.from, r.to));
         format!("{} ({}{of_most})", range(ratios().map(|r| r.0)), on(threads))
     });
-    // Of the overlap of the other engine that has least, third by third.
+    // Relative to the smallest overlap of another engine, for each third.
     let to_least = |mine: &WindowRow| {
         let same = |r: &&WindowRow| r.engine != OWN && (&r.run, r.from) == (&mine.run, mine.from);
         let least = rows.iter().filter(same).map(|r| r.penetration_mean).reduce(f64::min)?;
@@ -77,7 +77,7 @@ fn stalls(rows: &[WindowRow]) -> String {
     )
 }
 
-/// The thirds of the largest scene on the least number of threads.
+/// The thirds of the largest scene on the smallest number of threads.
 fn stages(rows: &[FallingRow]) -> String {
     let key = |r: &FallingRow| (r.bodies, std::cmp::Reverse(r.threads));
     let Some(most) = rows.iter().map(key).max() else { return String::new() };

@@ -37,7 +37,7 @@ pub(super) fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
     Ok(())
 }
 
-/// The stabilizations with their settings; each has 16 sweeps per step.
+/// The stabilizations with their settings, each with 16 sweeps per step.
 const STABILIZATIONS: [(&str, &str); 3] = [
     ("none", "substeps=1 iterations=16 relax=0 stabilization=none"),
     ("baumgarte", "substeps=1 iterations=16 relax=0 stabilization=baumgarte"),

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use super::{RulesReport, Standing, stand};
 use drystone::Result;
 
-/// The number of boxes, up to `most`, of the tallest tower that stands, by doubling and bisection: lower towers are assumed to stand.
+/// The number of boxes of the tallest standing tower, up to `most`, by doubling and bisection. Lower towers are assumed
+/// to stand.
 fn largest(most: u32, mut stands: impl FnMut(u32) -> Result<bool>) -> Result<u32> {
     let (mut good, mut bad) = (0, 1);
     while bad <= most && stands(bad)? {

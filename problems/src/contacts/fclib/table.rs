@@ -14,7 +14,7 @@ impl Tables {
     pub(super) fn open(bytes: Vec<u8>) -> Result<Self> {
         let length = bytes.len() as u64;
         let file = File::from_bytes(bytes).map_err(|e| input!("not a whole HDF5 file: {e}"))?;
-        // Otherwise a missing end would remain unnoticed, if it holds only optional data.
+        // Without this check, a missing end would go unnoticed if it holds only optional data.
         let whole = file.superblock().eof_address;
         ensure(length >= whole, || format!("not a whole HDF5 file: {length} of {whole} bytes"))?;
         Ok(Self { file })

@@ -172,8 +172,8 @@ impl Family {
             Self::PushedBlocks => moving::pushed(draw, g),
             Self::Piles => (moving::pile(draw)?, Law::Settles),
         };
-        // A domino wave needs steps of a quarter of the time from one domino to the next. The law says nothing for
-        // longer steps.
+        // A domino wave needs steps of at most a quarter of the time from one domino to the next. The law does not hold
+        // for longer steps.
         let dt = if let Law::Topples { speed, .. } = law { dt.min(0.25 * dominoes::pitch(&scene) / speed) } else { dt };
         let time = match law {
             Law::Topples { speed, .. } => dominoes::time(&scene, speed, g),
