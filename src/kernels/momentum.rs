@@ -11,7 +11,7 @@
 //! ```
 //!
 //! The first condition is the sharper one: a sweep that goes back where momentum went on. But it can hold off for ever on a
-//! cycle, which the second one ends. Numbers are in docs/convergence.md.
+//! cycle, which the second one ends. Numbers are in docs/experiments.md.
 //!
 //! Velocities are linear in the impulses and go along with the same factor. The result is x_k, so nothing follows the last
 //! sweep; the factor is 0 before the second.
