@@ -33,7 +33,7 @@ pub struct Mass<L> {
 }
 
 /// Friction up to which no solid of even density jams. A point at the lever r from the center of such a solid has m r²/I <= 15, and friction
-/// below 2/√14 jams no point with that (docs/derivation.md, section 6).
+/// below 8/15 jams no point with that (docs/derivation.md, section 6).
 pub const LEAST_JAMMING: f32 = 0.53;
 
 /// One over x, to half an ulp for most x; 0 where x is not positive.
