@@ -11,7 +11,7 @@
 //! ```
 //!
 //! The first condition is the stricter one. It holds when a sweep goes back against the momentum. In a cycle it may
-//! never hold, and then the second condition ends momentum. Numbers are in docs/convergence.md.
+//! never hold, and then the second condition ends momentum. Numbers are in docs/experiments.md.
 //!
 //! Velocities are linear in the impulses and use the same factor. The result is x_k, so nothing follows the last sweep.
 //! The factor is 0 before the second sweep.

@@ -33,7 +33,7 @@ pub struct Mass<L> {
 }
 
 /// No solid of even density jams with friction up to this. A point at the distance r from the center of such a solid
-/// has m r²/I <= 15, and with that ratio friction below 2/√14 jams no point (docs/derivation.md, section 6).
+/// has m r²/I <= 15, and with that ratio friction below 8/15 jams no point (docs/derivation.md, section 6).
 pub const LEAST_JAMMING: f32 = 0.53;
 
 /// 1/x, to half an ulp for most x; 0 if x is not positive.

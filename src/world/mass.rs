@@ -57,7 +57,7 @@ impl MassProperties {
     pub const MOST_RATIO: f32 = 1e12;
 
     /// Largest ratio of m r² to a moment of inertia that a simulation accepts, where r is the lever of the shapes about
-    /// that axis. The ratio is 3 for boxes, 2.5 for balls and at most 20 for cones. From about 100 on, sweeps that
+    /// that axis. The ratio is 3 for boxes, 2.5 for balls and at most 15 for cones. From about 100 on, sweeps that
     /// solve one point at a time never bring a body to rest (docs/derivation.md, section 3).
     pub const MOST_LEVERAGE: f32 = 32.0;
 
