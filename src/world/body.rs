@@ -732,15 +732,15 @@ impl Body {
         self.mass.check().map_err(|error| match self.weight {
             Weight::Given => error,
             _ if self.mass.mass == 0.0 && self.solids().next().is_none() => {
-                input!("mass = 0 kg: a dynamic body needs a shape that is no sensor, or mass_properties")
+                input!("mass = 0 kg: a dynamic body needs a shape other than a sensor, or mass_properties")
             }
             Weight::Density(density) if !(density > 0.0 && density.is_finite()) => {
                 input!("density = {density} kg/m³: must be a number above 0")
             }
             Weight::Total(mass) if !MassProperties::MASSES.contains(&mass) => {
-                input!("mass = {mass:e} kg, by total_mass: must be 1e-15 to 1e15")
+                input!("total_mass = {mass:e} kg: must be 1e-15 to 1e15 kg")
             }
-            _ if self.mass.mass == 0.0 => input!("{error}; Body::update_mass takes that of the shapes"),
+            _ if self.mass.mass == 0.0 => input!("{error}; call Body::update_mass to compute the mass from the shapes"),
             _ => error,
         })
     }

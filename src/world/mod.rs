@@ -285,7 +285,7 @@ impl World {
             let is_fixed = |body: usize| self.bodies[body].kind == BodyKind::Fixed;
             let ties_something = !is_fixed(a) || b.is_some_and(|b| !is_fixed(b));
             let other = || b.map_or_else(|| "the world".into(), |b| self.name_of(b));
-            ensure(ties_something, || format!("joint {i}: ties {} to {}, and both are fixed", self.name_of(a), other()))
+            ensure(ties_something, || format!("joint {i}: connects {} and {}, which are both fixed", self.name_of(a), other()))
         })
     }
 

@@ -82,7 +82,7 @@ impl Shape {
         // Check here: the hull code panics on a flat point cloud.
         let hull = spans_volume(points).then(|| SharedShape::convex_hull(points)).flatten();
         hull.map(|hull| Self(hull, Some(points.into())))
-            .ok_or_else(|| input!("a convex hull of {} points that spans no volume", points.len()))
+            .ok_or_else(|| input!("convex hull of {} points: the points must span a volume", points.len()))
     }
 
     /// All points p with p · `normal` <= 0; the normal points out of the solid and has unit length.

@@ -277,7 +277,7 @@ fn passes_over_colors_that_are_not_there_are_refused() {
         let mut passes = plan.passes.clone();
         passes[pass].colors = colors.clone();
         let line = refusal(problem.clone(), &passes).unwrap_or_else(|| panic!("pass {pass}, {colors:?}: was taken"));
-        assert!(line.starts_with(&format!("pass {pass}, ")) && line.contains("there are"), "{line}");
+        assert!(line.starts_with(&format!("pass {pass}, ")) && line.contains("must be within"), "{line}");
     }
 }
 
@@ -301,11 +301,11 @@ fn sums_of_a_problem_without_room_for_them_are_refused() {
     let (mut problem, _) = step(&[]);
     let sums = Pass { kernel: Kernel::SumImpulses { first: false }, block: 0, colors: 0..1 };
     let line = refusal(problem.clone(), std::slice::from_ref(&sums)).expect("refused");
-    assert_eq!(line, "pass 0, sum_impulses: totals: there are none");
+    assert_eq!(line, "pass 0, sum_impulses: needs totals, but the problem has none");
     let of_joints = Kernel::SumJointImpulses { first: false };
     let of_joints = Pass { kernel: of_joints, block: 0, colors: problem.joint_colors() };
     let line = refusal(problem.clone(), std::slice::from_ref(&of_joints)).expect("refused");
-    assert_eq!(line, "pass 0, sum_joint_impulses: joint_totals: there are none");
+    assert_eq!(line, "pass 0, sum_joint_impulses: needs joint_totals, but the problem has none");
     problem.totals = problem.impulses.clone();
     problem.joint_totals = problem.joint_impulses.clone();
     assert_eq!(refusal(problem.clone(), &[sums, of_joints]), None);
@@ -322,9 +322,9 @@ fn momentum_over_several_blocks_is_refused_and_so_is_a_pass_of_no_block() {
     let mut beyond = momentum.clone();
     beyond.block = 1;
     let line = refusal(problem.clone(), &[beyond]).expect("refused");
-    assert!(line.starts_with("pass 0, extrapolate: block 1: there are 1"), "{line}");
+    assert!(line.starts_with("pass 0, extrapolate: block 1: must be less than 1"), "{line}");
     first_block_of_nothing(&mut problem);
     assert_eq!(refusal(problem.clone(), &[]), None);
     let line = refusal(problem, std::slice::from_ref(momentum)).expect("refused");
-    assert!(line.contains("there is more than one block"), "{line}");
+    assert!(line.contains("the problem must have one block"), "{line}");
 }

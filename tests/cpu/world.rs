@@ -107,7 +107,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("body 2 \"\": density = NaN kg/m³: must be a number above 0", |w| {
             w.add(cube().density(f32::NAN).named(""));
         }),
-        ("body 2 \"\": mass = -1e0 kg, by total_mass: must be", |w| {
+        ("body 2 \"\": total_mass = -1e0 kg: must be", |w| {
             w.add(cube().total_mass(-1.0).named(""));
         }),
         ("body 0 \"\": mass = ", |w| {
@@ -117,11 +117,11 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("joint 0: ties", |w| {
             w.join(Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO));
         }),
-        ("joint 0: ties body 2 \"post\" to the world, and both are fixed", |w| {
+        ("joint 0: connects body 2 \"post\" and the world, which are both fixed", |w| {
             let post = w.add(Body::fixed().named("post"));
             w.join(Joint::to_world(post, Vec3::ZERO, Vec3::ZERO));
         }),
-        ("joint 0: ties body 2 \"post\" to body 3 \"beam\", and both are fixed", |w| {
+        ("joint 0: connects body 2 \"post\" and body 3 \"beam\", which are both fixed", |w| {
             let [post, beam] = ["post", "beam"].map(|name| w.add(Body::fixed().named(name)));
             w.join(Joint::new(post, Vec3::ZERO, beam, Vec3::ZERO).hinge(Vec3::Z));
         }),

@@ -285,10 +285,10 @@ fn impossible_shapes_are_refused() {
             json!({"type": "cuboid", "half_extents": [0.5, -1, 0.5]}),
             "cuboid of half extent -1: must be more than 0 and at most 1e9 m",
         ),
-        (json!({"type": "convex_hull", "points": []}), "a convex hull of 0 points that spans no volume"),
+        (json!({"type": "convex_hull", "points": []}), "convex hull of 0 points: the points must span a volume"),
         (
             json!({"type": "convex_hull", "points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]}),
-            "a convex hull of 4 points that spans no volume",
+            "convex hull of 4 points: the points must span a volume",
         ),
         (
             json!({"type": "convex_hull", "points": [[0, 0, 0], [1, 0, 1e39]]}),

@@ -167,7 +167,7 @@ impl RunArgs {
                     Some(file) => format!("`drystone replay {}` runs it again", file.display()),
                     None => "the same command with --record FILE keeps the run, for a report".into(),
                 };
-                Err(Error::input(format!("body {body} left the finite range: its numbers are not to be used; {kept}")))
+                Err(Error::input(format!("body {body} left the finite range: do not use its results; {kept}")))
             }
             None => Ok(()),
         }

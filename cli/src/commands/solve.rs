@@ -110,7 +110,7 @@ impl SolveArgs {
             ("--exact", self.exact),
         ];
         if let Some((name, _)) = given.into_iter().find(|given| given.1) {
-            return Err(Error::input(format!("{name}: --method newton has none")));
+            return Err(Error::input(format!("{name}: not available with --method newton")));
         }
         if self.backend != BackendKind::F64 {
             return Err(Error::input(format!("--backend {}: --method newton runs in f64", self.backend)));

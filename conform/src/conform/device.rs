@@ -79,7 +79,7 @@ async fn large_buffers(run: &mut Run<'_>) -> Outcome {
     if if run.is_exact() { count_of_numbers > 0 } else { apart > PLAIN_PASS } {
         return failed!("{count} bodies in {mib} MiB: {count_of_numbers} numbers differ, by {apart:.1e}");
     }
-    Ok(format!("{count} bodies in {mib} MiB, apart by {apart:.1e}"))
+    Ok(format!("{count} bodies in {mib} MiB, largest difference {apart:.1e}"))
 }
 
 /// Checks that a device with these options refuses a step in one line, and that the processor then runs it.
