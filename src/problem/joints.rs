@@ -126,7 +126,9 @@ impl JointRows {
         let are_colors = offsets.is_sorted() && offsets.last().is_none_or(|&end| end as usize <= order.len());
         let are_systems = self.systems.iter().all(|&s| s == SWEPT || (s as usize) < problem.systems.len());
         let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.left.len()] == [count; 2];
-        ensure(are_joints && are_colors && are_systems && are_chosen, || "the colors or systems do not match the joints".into())
+        ensure(are_joints && are_colors && are_systems && are_chosen, || {
+            "the colors or systems do not match the joints".into()
+        })
     }
 
     /// Forgets the colors of all joints, so that they are colored anew.

@@ -1056,7 +1056,7 @@ impl Body {
             let fits = (self.kind != BodyKind::Kinematic && !c.sensor) || !c.shape.is_half_space();
             ensure(fits, || "half-spaces are for fixed bodies only, and cannot be sensors".into())?;
             let fits = self.kind != BodyKind::Dynamic || c.sensor || c.shape.has_volume();
-            ensure(fits, || "half-spaces, meshes and height fields have no mass: not for dynamic bodies".into())
+            ensure(fits, || "a dynamic body cannot have half-spaces, meshes or height fields: they have no mass".into())
         };
         let mut shapes = self.colliders.iter().enumerate();
         shapes.try_for_each(|(k, c)| check(c).map_err(|e| e.within(format_args!("shapes[{k}]"))))

@@ -147,7 +147,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("contacts[0].point_count = 0", |p, _| p.contacts[0].point_count = 0),
         ("contacts[0].point_count = 5", |p, _| p.contacts[0].point_count = 5),
         ("contacts[0].first_point", |p, _| p.contacts[0].first_point = p.points.len() as u32),
-        ("contacts[2].first_point = 0: points of contacts[0] are there", |p, _| {
+        ("contacts[2].first_point = 0: overlaps the points of contacts[0]", |p, _| {
             p.contacts[2].first_point = 0;
             p.order = vec![0, 2];
             p.colors = vec![0, 2];
@@ -254,7 +254,7 @@ fn a_joint_color_with_a_body_twice_is_refused() {
     problem.colors.push(joints.end as u32);
     problem.in_one_block(contacts as u32, problem.blocks[0].substep);
     let line = refusal(problem, &plan.passes[..0]).expect("refused");
-    assert!(line.contains("occurs twice, and can move"), "{line}");
+    assert!(line.contains("can move, but occurs twice"), "{line}");
 }
 
 #[test]

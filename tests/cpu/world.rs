@@ -202,7 +202,7 @@ fn a_joint_to_a_body_that_is_gone_is_refused_and_does_not_tie_a_stranger() {
             w.beside(&other);
         })
     };
-    let told = "joint 0: names body 2, which is gone: \"stranger\" has its index";
+    let told = "joint 0: names body 2, which was removed: \"stranger\" has its index";
     for joint in [(|b, a| Joint::new(b, Vec3::ZERO, a, Vec3::ZERO)) as fn(BodyHandle, BodyHandle) -> Joint, |b, a| {
         Joint::new(b, Vec3::ZERO, a.index(), Vec3::ZERO)
     }] {
