@@ -124,7 +124,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("params.axis_count: ", |p, _| p.params.axis_count += 1),
         ("joints[0].axis_count = 13", |p, _| p.joints[0].axis_count = 13),
         ("joints[0].first_axis = 0", |p, _| p.joints[0].axis_count = 1),
-        ("joints[1].first_axis = 0: axes of joints", |p, _| {
+        ("joints[1].first_axis = 0: overlaps the axes of joints", |p, _| {
             p.axes.push(AxisRow::default());
             p.joint_impulses.push(JointImpulseRow::default());
             p.params.axis_count = 1;

@@ -114,7 +114,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
             w.bodies[0] = Body::fixed().shape(Shape::ball(1.0));
             w.bodies[0].kind = BodyKind::Dynamic;
         }),
-        ("joint 0: ties", |w| {
+        ("joint 0: connects", |w| {
             w.join(Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO));
         }),
         ("joint 0: connects body 2 \"post\" and the world, which are both fixed", |w| {
