@@ -115,7 +115,7 @@ impl Load {
     /// The number is larger than the settings accept, or contacts are not soft and their overlap has no known limit.
     pub fn substeps(&self, most: f64, dt: f32, config: &SolverConfig) -> Result<u32> {
         if config.stabilization != Stabilization::Soft {
-            return Err(Error::input("a largest penetration is a promise of soft contacts: set stabilization=soft"));
+            return Err(Error::input("a limit on penetration needs soft contacts: set stabilization=soft"));
         }
         let substeps = (self.overlap(1, dt, config) / most).sqrt().ceil().max(1.0);
         if substeps <= MOST_SUBSTEPS {

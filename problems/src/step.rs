@@ -73,7 +73,7 @@ fn check(simulation: &Simulation, name: &str) -> Result<()> {
     if let Some(i) = world.bodies.iter().position(Body::has_locked_rotation) {
         let name = &world.bodies[i].name;
         return Err(Error::input(format!(
-            "body {i} {name:?} has locked rotations: a body of a contact problem turns freely"
+            "body {i} {name:?} has locked rotations: a contact problem cannot have locked rotations"
         )));
     }
     Ok(())

@@ -254,7 +254,7 @@ class Batch:
             counts.add(_check.whole("num_worlds", num_worlds, 1))
         if len(counts) > 1:
             given = f"{len(scenes)} scenes, {len(configs)} configs and num_worlds = {num_worlds}"
-            raise ValueError(f"{given}: must be one, or as many as worlds")
+            raise ValueError(f"{given}: must be one, or one for each world")
         count = counts.pop() if counts else 1
         is_one = len(scenes) == len(configs) == 1
         threads = _check.whole("num_threads", num_threads)

@@ -149,7 +149,7 @@ def _seeds(seeds: int | Iterable[int]) -> list[int]:
     if max(numbers) > LAST_SEED:
         raise ValueError(f"seeds has {max(numbers)}: must be at most 2^53")
     if len(set(numbers)) < len(numbers):
-        raise ValueError("seeds: one is there twice")
+        raise ValueError("seeds: a seed occurs twice")
     return numbers
 
 

@@ -149,7 +149,7 @@ fn load(path: &Path) -> Result<Scene> {
 fn whole(scene: &str, parameters: &[String], key: &str) -> Result<f64> {
     let refusal = |known: &[&str], list: &str| {
         let hint = hint(key, known.iter().copied(), format_args!("it has: {list}"));
-        input!("{scene} has no whole number {key:?} to vary{hint}")
+        input!("{scene} has no whole-number parameter {key:?} to vary{hint}")
     };
     let entry = CATALOGUE.iter().find(|e| e.name == scene).ok_or_else(|| refusal(&[], "none, being a file"))?;
     let known: Vec<_> = entry.parameters.iter().filter(|p| p.whole).map(|p| p.name).collect();

@@ -284,13 +284,13 @@ impl Character {
     }
 
     fn check(&self, world: &World, velocity: Vec3) -> Result<()> {
-        let body = world.body(self.body).ok_or_else(|| input!("the body of the character is gone"))?;
+        let body = world.body(self.body).ok_or_else(|| input!("the body of the character was removed"))?;
         let name = world.name_of(self.body.index());
         ensure(body.kind == BodyKind::Kinematic, || format!("{name}: the body of a character must be kinematic"))?;
         let is_convex = body.solids().all(|collider| collider.shape.has_volume());
         let has_shapes = body.solids().next().is_some();
         ensure(has_shapes && is_convex, || {
-            format!("{name}: the body of a character needs shapes, and only convex ones")
+            format!("{name}: the body of a character must have shapes, all of them convex")
         })?;
         body.check().map_err(|error| error.within(&name))?;
         ensure((self.up.length() - 1.0).abs() < 1e-3, || format!("up = {}: must have length 1", self.up))?;

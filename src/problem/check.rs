@@ -128,7 +128,7 @@ impl StepProblem {
             };
             if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
                 return refuse(format_args!(
-                    "contacts[{row}].first_point = {first}: points of contacts[{other}] are there"
+                    "contacts[{row}].first_point = {first}: overlaps the points of contacts[{other}]"
                 ));
             }
             own.fill(row);
@@ -152,7 +152,9 @@ impl StepProblem {
                 ));
             };
             if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
-                return refuse(format_args!("joints[{row}].first_axis = {first}: axes of joints[{other}] are there"));
+                return refuse(format_args!(
+                    "joints[{row}].first_axis = {first}: overlaps the axes of joints[{other}]"
+                ));
             }
             own.fill(row);
         }
@@ -216,11 +218,11 @@ impl StepProblem {
                         }
                         if block_of[body] != i {
                             return refuse(format_args!(
-                                "color {color}: body {body} is not of block {i}, and can move"
+                                "color {color}: body {body} can move, but is not of block {i}"
                             ));
                         }
                         if std::mem::replace(&mut seen[body], color) == color {
-                            return refuse(format_args!("color {color}: body {body} occurs twice, and can move"));
+                            return refuse(format_args!("color {color}: body {body} can move, but occurs twice"));
                         }
                     }
                 }

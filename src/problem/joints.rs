@@ -120,13 +120,15 @@ impl JointRows {
             a < bodies && b.is_none_or(|b| b < bodies)
         };
         let are_bodies = self.edges.iter().all(|edge| is_body(&edge.a) && is_body(&edge.b));
-        ensure(are_bodies && self.joints.iter().all(has_bodies), || "a joint is of a body beyond the last".into())?;
+        ensure(are_bodies && self.joints.iter().all(has_bodies), || "a joint names a body beyond the last".into())?;
         let Coloring { order, offsets, .. } = &self.coloring;
         let are_joints = order.iter().all(|&joint| (joint as usize) < count);
         let are_colors = offsets.is_sorted() && offsets.last().is_none_or(|&end| end as usize <= order.len());
         let are_systems = self.systems.iter().all(|&s| s == SWEPT || (s as usize) < problem.systems.len());
         let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.left.len()] == [count; 2];
-        ensure(are_joints && are_colors && are_systems && are_chosen, || "colors or systems of no joints".into())
+        ensure(are_joints && are_colors && are_systems && are_chosen, || {
+            "the colors or systems do not match the joints".into()
+        })
     }
 
     /// Forgets the colors of all joints, so that they are colored anew.

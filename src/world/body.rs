@@ -732,15 +732,15 @@ impl Body {
         self.mass.check().map_err(|error| match self.weight {
             Weight::Given => error,
             _ if self.mass.mass == 0.0 && self.solids().next().is_none() => {
-                input!("mass = 0 kg: a dynamic body needs a shape that is no sensor, or mass_properties")
+                input!("mass = 0 kg: a dynamic body needs a shape other than a sensor, or mass_properties")
             }
             Weight::Density(density) if !(density > 0.0 && density.is_finite()) => {
                 input!("density = {density} kg/m³: must be a number above 0")
             }
             Weight::Total(mass) if !MassProperties::MASSES.contains(&mass) => {
-                input!("mass = {mass:e} kg, by total_mass: must be 1e-15 to 1e15")
+                input!("total_mass = {mass:e} kg: must be 1e-15 to 1e15 kg")
             }
-            _ if self.mass.mass == 0.0 => input!("{error}; Body::update_mass takes that of the shapes"),
+            _ if self.mass.mass == 0.0 => input!("{error}; call Body::update_mass to compute the mass from the shapes"),
             _ => error,
         })
     }
@@ -1056,7 +1056,7 @@ impl Body {
             let fits = (self.kind != BodyKind::Kinematic && !c.sensor) || !c.shape.is_half_space();
             ensure(fits, || "half-spaces are for fixed bodies only, and cannot be sensors".into())?;
             let fits = self.kind != BodyKind::Dynamic || c.sensor || c.shape.has_volume();
-            ensure(fits, || "half-spaces, meshes and height fields have no mass: not for dynamic bodies".into())
+            ensure(fits, || "a dynamic body cannot have half-spaces, meshes or height fields: they have no mass".into())
         };
         let mut shapes = self.colliders.iter().enumerate();
         shapes.try_for_each(|(k, c)| check(c).map_err(|e| e.within(format_args!("shapes[{k}]"))))

@@ -125,7 +125,9 @@ impl MassProperties {
     pub(super) fn check_frame(&self) -> Result<()> {
         let Self { center, principal_frame, .. } = *self;
         let message = || {
-            format!("center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation")
+            format!(
+                "center of mass = {center}, principal frame = {principal_frame}: must be within 1e9 m and a unit quaternion"
+            )
         };
         ensure(is_place(center) && is_rotation(principal_frame), message)
     }

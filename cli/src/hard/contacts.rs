@@ -120,7 +120,7 @@ pub(super) fn no_inertia(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
     let moved = still.iter().map(|&i| before.bodies[i].position.distance(simulation.world.bodies[i].position).into());
     checks.finite("", &simulation.world);
-    checks.at_most("distance moved by bodies at rest [mm]", 1e3 * largest(LEAST, moved), 1.0);
+    checks.at_most("displacement of bodies at rest [mm]", 1e3 * largest(LEAST, moved), 1.0);
     checks.at_most("largest speed [m/s]", speed, 0.1);
     Ok(())
 }

@@ -186,7 +186,7 @@ pub fn judge_while(
             checks.at_most("bodies out of place", fallen as f64, 0.0);
             checks.at_most("fastest body at the end, over a fall by the size of one", speed(end), AT_REST);
         }
-        Law::Sticks => checks.at_most("distance moved by the block [mm]", 1e3 * way(start, end), 1e3 * CREEP),
+        Law::Sticks => checks.at_most("displacement of the block [mm]", 1e3 * way(start, end), 1e3 * CREEP),
         Law::Slides(acceleration) => {
             let time = f64::from(scene.steps) * f64::from(scene.dt);
             let exact = *acceleration * time;

@@ -343,7 +343,7 @@ fn the_tables_of_the_pages_have_the_figures_of_the_rows() {
         for changed in [&*without_bold, &figure, ""] {
             std::fs::write(&path, [&text[..row], changed, &text[end..]].concat()).unwrap();
             let message = tables(folder.path(), true).unwrap_err().to_string();
-            assert!(message.contains("is not that of the rows") && message.lines().count() == 1, "{message}");
+            assert!(message.contains("but the rows give") && message.lines().count() == 1, "{message}");
             tables(folder.path(), false).unwrap();
             assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
         }

@@ -79,7 +79,10 @@ impl Row {
         ] {
             if own != others {
                 let names = [self, other].map(|row| format!("{} on {}", row.setting().label(), row.scene));
-                return Err(Error::input(format!("no ratio of {} to {}: {what} {own}, {others}", names[0], names[1])));
+                return Err(Error::input(format!(
+                    "cannot compare {} with {}: {what} {own} and {others} differ",
+                    names[0], names[1]
+                )));
             }
         }
         Ok(self.ratio / other.ratio)

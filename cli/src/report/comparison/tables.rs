@@ -76,7 +76,7 @@ pub fn tables(root: &Path, check: bool) -> Result<Vec<PathBuf>> {
         match first_difference(&text, &new) {
             Some((line, was, is)) if check => {
                 let page = path.display();
-                Err(Error::input(format!("{page}: line {line} is not that of the rows: {was:?}, now {is:?}")))
+                Err(Error::input(format!("{page}: line {line} is {was:?}, but the rows give {is:?}")))
             }
             Some(_) => files::write(&path, new.as_bytes()).map(|()| path),
             None => Ok(path),
@@ -131,7 +131,9 @@ impl Rows {
                 ))
             }
             "problems" => Ok(self.problems()),
-            _ => Err(Error::input(format!("no rows {name:?}: engines, equal error, kinds, ahead or problems"))),
+            _ => Err(Error::input(format!(
+                "unknown rows {name:?}: must be engines, equal error, kinds, ahead or problems"
+            ))),
         }
     }
 

@@ -131,10 +131,10 @@ mod tests {
             ("spacedim", Whole(vec![2]), "must be 3"),
             ("W/m", Whole(vec![size + 3]), "24 x 21: contacts have"),
             ("W/n", Whole(vec![size - 1]), "less than 20"),
-            ("W/nz", Whole(vec![-3]), "-3: is no form"),
+            ("W/nz", Whole(vec![-3]), "-3: must be -2, -1 or a count"),
             ("W/x", number("W/x", 0, -1.0), "contact 0: its diagonal [-1.0"),
             ("W/x", number("W/x", 3, f64::NAN), "number 3 is NaN"),
-            ("vectors/q", Real(vec![0.0; 20]), "[20], and 21 numbers"),
+            ("vectors/q", Real(vec![0.0; 20]), "[20], but 21 numbers"),
             ("vectors/mu", number("vectors/mu", 6, -0.5), "-0.5 of contact 6"),
         ] {
             let mut tree = good.clone();
