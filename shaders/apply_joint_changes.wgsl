@@ -1,7 +1,7 @@
-// apply_joint_changes: one thread applies the corrections of one joint of one color and of its locks to its bodies.
-// Reads joints, axes, joint_changes, masses. Writes bodies that can move.
-// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
-// Double: src/kernels/joint_system.rs.
+// apply_joint_changes: one thread applies the corrections of one joint of one color, and of its axes, to its bodies.
+// Reads joints, axes, joint_changes, masses. Writes movable bodies.
+// No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
+// Twin: src/kernels/joint_system.rs.
 
 fn apply_joint_change(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }

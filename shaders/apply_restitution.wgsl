@@ -1,7 +1,8 @@
-// apply_restitution: one thread lets the points of one manifold bounce that approached faster than the threshold: together, then each.
-// Reads contacts, points, masses. Writes impulses, and bodies that can move.
-// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
-// Double: src/kernels/contact.rs.
+// apply_restitution: one thread makes the points of one manifold bounce that approached faster than the threshold:
+// first together, then each alone.
+// Reads contacts, points, masses. Writes impulses and movable bodies.
+// No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
+// Twin: src/kernels/contact.rs.
 
 fn bounce(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, impulse: Impulse) -> Wanted {
     let bounces = -params.restitution_threshold > point.approach_velocity && impulse.peak > 0.0;

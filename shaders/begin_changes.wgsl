@@ -1,6 +1,7 @@
-// begin_changes: one thread makes the velocities of one body changes since the step began: none yet. A body that nothing pushes keeps
-// its velocities: bodies that rest are in no block, and no pass writes their rows of `free`.
-// Reads masses. Writes bodies and free; no other thread writes the same one. Double: src/kernels/integrate.rs.
+// begin_changes: one thread turns the velocities of one body into changes since the step began, which are zero at
+// first. A body that nothing pushes keeps its velocities. Bodies at rest are in no block, and no pass writes their rows
+// of `free`.
+// Reads masses. Writes bodies and free; no other thread writes the same ones. Twin: src/kernels/integrate.rs.
 
 fn begin_change(i: u32) {
     let is_movable = masses[i].inv_mass > 0.0;

@@ -1,8 +1,9 @@
 // begin_sweep: one thread decides whether the next sweep is still needed, and counts sweeps.
-// Reads and writes convergence. Double: src/kernels/convergence.rs.
+// Reads and writes convergence. Twin: src/kernels/convergence.rs.
 
 fn begin_sweep(first: bool) {
-    // The first sweep of a substep is always needed; a later one only if the sweep before it moved an impulse by more than the tolerance.
+    // The first sweep of a substep is always needed. A later one is needed if the sweep before moved an impulse by more
+    // than the tolerance.
     let done = !first && (convergence.done != 0u || atomicLoad(&convergence.moving) == 0u);
     convergence.done = select(0u, 1u, done);
     convergence.sweeps += select(1u, 0u, done);

@@ -1,13 +1,15 @@
-// begin_systems: one thread lets one system of joints begin where its bodies are. The next solution factors it.
-// Reads joint_systems, joints, axes, bodies, masses. Writes joint_nodes; no other thread writes those of the same system.
-// Double: begin_system in src/kernels/joint_system.rs.
+// begin_systems: one thread begins one system of joints at the present poses of its bodies. The next solution factors
+// it.
+// Reads joint_systems, joints, axes, bodies, masses. Writes joint_nodes; no other thread writes those of the same
+// system.
+// Twin: begin_system in src/kernels/joint_system.rs.
 
-// The anchors of a joint as three rows, along the axes of the world: one of them.
+// One of the three rows of the anchors of a joint, along an axis of the world.
 fn anchor_motion(anchors: Anchors, along: vec3f) -> AxisMotion {
     return AxisMotion(along, cross3(anchors.r_a, along), cross3(anchors.r_b, along), 0.0);
 }
 
-// Row i of a node; zero where there is none.
+// Row i of a node; zero if the row is missing.
 fn row_motion(pair: ptr<function, Pair>, joint: Joint, rows: u32, i: u32) -> AxisMotion {
     let axis = axis_of_row(rows, i);
     if axis == 0u { return AxisMotion(vec3f(), vec3f(), vec3f(), 0.0); }

@@ -1,5 +1,5 @@
-// clear_impulses: one thread sets the impulses of one manifold to zero, for plans that clamp each correction by itself.
-// Reads contacts. Writes impulses; one thread a manifold. Double: src/kernels/contact.rs.
+// clear_impulses: one thread clears the impulses of one manifold, for plans that clamp each correction.
+// Reads contacts. Writes impulses; one thread for each manifold. Twin: src/kernels/contact.rs.
 
 fn clear_contact(i: u32) {
     let contact = contacts[i];

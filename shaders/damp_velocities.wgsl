@@ -1,6 +1,6 @@
-// damp_velocities: one thread lets the velocities of one body decay that the body has without the impulses of this substep. With
+// damp_velocities: one thread damps the velocities that one body has without the impulses of this substep. With
 // `is_from_start` velocities are changes since the step began, and `free` stays.
-// Reads dampings. Writes bodies and free; no other thread writes the same one. Double: src/kernels/integrate.rs.
+// Reads dampings. Writes bodies and free; no other thread writes the same ones. Twin: src/kernels/integrate.rs.
 
 fn damp_velocity(is_from_start: bool, i: u32) {
     let damping = dampings[i];

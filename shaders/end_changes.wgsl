@@ -1,5 +1,5 @@
-// end_changes: one thread makes velocities of the changes of one body.
-// Reads free. Writes bodies; no other thread writes the same one. Double: src/kernels/integrate.rs.
+// end_changes: one thread turns the changes of one body back into velocities.
+// Reads free. Writes bodies; no other thread writes the same one. Twin: src/kernels/integrate.rs.
 
 fn end_change(i: u32) {
     bodies[i].v = free[i].v + bodies[i].v;

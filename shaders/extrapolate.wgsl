@@ -1,14 +1,16 @@
-// extrapolate: before an accelerated sweep every velocity and impulse goes on in the direction of the last sweeps. Before the first
-// sweep the kernel only notes them. In impulse_steps joints follow the points, and their axes follow the joints.
-// Reads momentum, or sets it before the first sweep. Writes bodies, impulses, joint_impulses, velocities_before, impulse_steps; one thread a row.
-// Double: src/kernels/momentum.rs.
+// extrapolate: before an accelerated sweep, every velocity and impulse continues in the direction of the last sweeps.
+// Before the first sweep the kernel only stores them. In impulse_steps joints follow the points, and axes follow the
+// joints.
+// Reads momentum, or sets it before the first sweep. Writes bodies, impulses, joint_impulses, velocities_before,
+// impulse_steps; one thread for each row.
+// Twin: src/kernels/momentum.rs.
 
 fn extrapolated(is_first: bool, now: vec3f, before: vec3f) -> vec3f {
     if is_first { return now; }
     return now + (now - before) * momentum.factor;
 }
 
-// Extrapolates an impulse, and notes the impulse before and after.
+// Extrapolates an impulse, and stores its former value and its new start.
 fn extrapolated_impulse(is_first: bool, i: u32, now: vec3f) -> vec3f {
     let begin = extrapolated(is_first, now, impulse_steps[i].before);
     impulse_steps[i] = ImpulseStep(now, begin);

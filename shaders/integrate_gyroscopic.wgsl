@@ -1,7 +1,7 @@
-// integrate_gyroscopic: one thread turns the spin of one body with unequal moments of inertia, by implicit midpoint.
-// With `is_from_start` velocities are changes since the step began, and `free` stays.
-// Reads inertias. Writes bodies and free; one thread a body.
-// Double: src/kernels/integrate.rs.
+// integrate_gyroscopic: one thread changes the spin of one body with unequal moments of inertia, by the implicit
+// midpoint rule. With `is_from_start` velocities are changes since the step began, and `free` stays.
+// Reads inertias. Writes bodies and free; one thread for each body.
+// Twin: src/kernels/integrate.rs.
 
 // Solves rows x = g by Cramer's rule.
 fn solve_3x3(row_0: vec3f, row_1: vec3f, row_2: vec3f, g: vec3f) -> vec3f {
@@ -11,7 +11,7 @@ fn solve_3x3(row_0: vec3f, row_1: vec3f, row_2: vec3f, g: vec3f) -> vec3f {
     return (c_0 * g.x + c_1 * g.y + c_2 * g.z) * reciprocal(dot3(row_0, c_0));
 }
 
-// The correction of one step of Newton's method on change + h I^-1 (m x I m) = 0, where m is the spin midway.
+// The correction of one step of Newton's method on change + h I^-1 (m x I m) = 0, where m is the midpoint spin.
 fn newton_step(inertia: Inertia, h: f32, m: vec3f, change: vec3f) -> vec3f {
     let p = inertia.principal;
     let k = inertia.inv_principal;
@@ -24,8 +24,8 @@ fn newton_step(inertia: Inertia, h: f32, m: vec3f, change: vec3f) -> vec3f {
     return solve_3x3(row_0, row_1, row_2, residual);
 }
 
-// The change of a spin in the time h, by some steps of Newton's method. The unknown is the spin after h, or with `is_from_start` the change
-// itself.
+// The change of a spin in the time h, by `steps` steps of Newton's method. The unknown is the spin after h. With
+// `is_from_start` the unknown is the change itself.
 fn spin_change(is_from_start: bool, steps: u32, inertia: Inertia, h: f32, spin: vec3f) -> vec3f {
     if is_from_start {
         var change = vec3f(0.0);
@@ -41,7 +41,7 @@ fn spin_change(is_from_start: bool, steps: u32, inertia: Inertia, h: f32, spin: 
     return next - spin;
 }
 
-// Square of the angle [rad] up to which two Newton steps leave no more than rounding.
+// Square of the largest angle (rad) at which two Newton steps leave only rounding errors.
 const SLOW: f32 = 0.0625;
 
 // The change of the angular velocity w of a body that spins fast about its principal axes x, y, z. `square` is (h W)^2.
@@ -50,8 +50,9 @@ fn fast_turn(is_from_start: bool, inertia: Inertia, square: f32, x: vec3f, y: ve
     if square > 1.0 { h = pass_row.substep * inverse_sqrt(square); }
     let change = spin_change(is_from_start, 4u, inertia, h, spin);
     let turn = x * change.x + y * change.y + z * change.z;
-    // Axes that are not quite of unit length stretch a large change, always in the same sense: the energy E is set back, to
-    // E (3 - E)^2 / 4 of what it was, which is never above 1. A spin whose energy is no number stays.
+    // Axes that are not quite of unit length stretch a large change, always in the same direction. The scale brings the
+    // energy back. With the ratio E of the energies after and before, the result has E (3 - E)^2 / 4 of the energy
+    // before, which is never more. A spin stays if its energy is NaN or would at least triple.
     let changed = w + turn;
     let after = vec3f(dot3(x, changed), dot3(y, changed), dot3(z, changed));
     let energy = dot3(inertia.principal * spin, spin);
@@ -65,13 +66,13 @@ fn turn_spin(is_from_start: bool, i: u32) {
     let p = inertia.principal;
     let k = inertia.inv_principal;
 
-    // The principal axes now.
+    // The present principal axes.
     let q = quat_mul(bodies[inertia.body].dq, inertia.frame);
     let x = turned(q, vec3f(1.0, 0.0, 0.0)) + vec3f(1.0, 0.0, 0.0);
     let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
     let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
 
-    // The free spin: impulses come later.
+    // The free spin. Impulses come later.
     var w = free[inertia.body].w;
     if is_from_start { w = w + bodies[inertia.body].w; }
     let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
@@ -85,7 +86,7 @@ fn turn_spin(is_from_start: bool, i: u32) {
 
     var turn: vec3f;
     if SLOW > square {
-        // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
+        // Only the change is turned back. Otherwise rounding of the axes would stretch a spin that nothing changes.
         let change = spin_change(is_from_start, 2u, inertia, pass_row.substep, spin);
         turn = x * change.x + y * change.y + z * change.z;
     } else {

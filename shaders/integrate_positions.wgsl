@@ -1,5 +1,5 @@
 // integrate_positions: one thread moves one body by its velocity.
-// Writes bodies; no other thread writes the same one. Double: src/kernels/integrate.rs.
+// Reads free. Writes bodies; no other thread writes the same one. Twin: src/kernels/integrate.rs.
 
 fn integrate_position(is_from_start: bool, i: u32) {
     let body = bodies[i];

@@ -1,5 +1,6 @@
-// measure_joints: one thread computes the velocities that one joint and its locks lack.
-// Reads joints, axes, bodies, masses. Writes joint_changes; no other thread writes the same one. Double: src/kernels/joint_system.rs.
+// measure_joints: one thread computes the velocities that the anchors and axes of one joint lack.
+// Reads joints, axes, bodies, masses. Writes joint_changes; no other thread writes the same ones. Twin:
+// src/kernels/joint_system.rs.
 
 fn measure_joint(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }

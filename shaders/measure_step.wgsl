@@ -1,6 +1,7 @@
-// measure_step: one workgroup adds up the step of a sweep over the impulses of IMPULSES_PER_CHUNK points or joints: its square, and its product
-// with the way from the result of the sweep before. Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup a pair of sums.
-// Double: src/kernels/momentum.rs.
+// measure_step: one workgroup sums over the impulses of IMPULSES_PER_CHUNK points, joints or axes. The first sum is the
+// squared step of a sweep. The second is the product of this step with the change since the result of the sweep before.
+// Reads impulses, joint_impulses, impulse_steps. Writes lengths; one workgroup for each pair of sums.
+// Twin: src/kernels/momentum.rs.
 
 fn step_length(i: u32) -> vec2f {
     var now: vec3f;

@@ -1,7 +1,7 @@
-// solve_axes: one thread sweeps the limits and drives of one joint of one color, whose locks are solved at once with others.
-// Reads joints, axes, masses. Writes joint_impulses, and bodies that can move.
-// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
-// Double: solve_axis in src/kernels/axis.rs.
+// solve_axes: one thread sweeps the limits and drives of one joint of one color, whose locks are solved directly.
+// Reads joints, axes, masses. Writes joint_impulses and movable bodies.
+// No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
+// Twin: solve_axis in src/kernels/axis.rs.
 
 fn solve_swept_axes(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }

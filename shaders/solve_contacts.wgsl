@@ -1,7 +1,7 @@
 // solve_contacts: one thread sweeps one manifold of one color.
-// Reads contacts, points, masses. Writes impulses, and bodies that can move.
-// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
-// Double: src/kernels/contact.rs.
+// Reads contacts, points, masses. Writes impulses and movable bodies.
+// No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
+// Twin: src/kernels/contact.rs.
 
 fn sweep_normals(rules: Rules, pair: ptr<function, Pair>, contact: Contact) {
     let softness = pair_softness(pair);

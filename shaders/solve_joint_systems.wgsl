@@ -1,8 +1,9 @@
 // solve_joint_systems: one thread solves one system of joints.
-// Reads joint_systems, joints. Writes joint_blocks, joint_nodes, joint_changes, joint_impulses; no other thread writes those of the same
-// system. Double: solve_system in src/kernels/joint_system.rs.
+// Reads joint_systems, joints. Writes joint_blocks, joint_nodes, joint_changes, joint_impulses; no other thread writes
+// those of the same system.
+// Twin: solve_system in src/kernels/joint_system.rs.
 
-// The velocity that row i of a node lacks, less what its softness gives way by; 0 where there is no row.
+// The velocity that row i of a node lacks, less the velocity by which its softness yields; 0 for a missing row.
 fn right_of_row(first_axis: u32, rows: u32, i: u32, softness: f32) -> f32 {
     let axis = axis_of_row(rows, i);
     if axis == 0u { return 0.0; }
@@ -10,7 +11,7 @@ fn right_of_row(first_axis: u32, rows: u32, i: u32, softness: f32) -> f32 {
     return joint_changes[k].linear.x - joint_impulses[k].linear.x * softness;
 }
 
-// Keeps the correction of row i of a node.
+// Stores the correction of row i of a node, and adds it to the impulse.
 fn change_row(first_axis: u32, rows: u32, i: u32, change: f32) {
     let axis = axis_of_row(rows, i);
     if axis == 0u { return; }
@@ -60,7 +61,7 @@ fn without_column(m: mat3x3f, i: u32) -> mat3x3f {
     return mat3x3f(select(m[0], zero, i == 0u), select(m[1], zero, i == 1u), select(m[2], zero, i == 2u));
 }
 
-// Takes row i of a node out if it is a limit that holds, and bears no impulse or would pull; whether it did.
+// Removes row i of a node if it is a limit that holds but has no impulse, or would pull. Returns whether it did.
 fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: bool, change: f32) -> bool {
     if !is_limit_row(rows, i) || !held { return false; }
     let before = joint_impulses[first_axis + axis_of_row(rows, i) - 1u].linear.x;
@@ -78,8 +79,8 @@ fn let_go_of_row(node: u32, first_axis: u32, rows: u32, i: u32, held: bool, chan
     return true;
 }
 
-// Takes the limits out of one system that hold, and bear no impulse or would pull with the changes that were found; whether there were any.
-// In a system that is new, all hold.
+// Removes from a system the limits that hold but have no impulse, or would pull after the changes found. Returns
+// whether there were any. In a new system, all limits hold.
 fn let_go(system: u32, is_new: bool) -> bool {
     var any = false;
     let end = begin_of_system(system + 1u);
@@ -96,7 +97,7 @@ fn let_go(system: u32, is_new: bool) -> bool {
     return any;
 }
 
-// Finds the changes of the impulses of one system, the right sides of its nodes.
+// Finds the changes of the impulses of a system, and stores them as the right-hand sides of its nodes.
 fn find_changes(system: u32) {
     let first = begin_of_system(system);
     let end = begin_of_system(system + 1u);

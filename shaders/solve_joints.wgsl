@@ -1,7 +1,7 @@
 // solve_joints: one thread sweeps one joint of one color.
-// Reads joints, axes, masses. Writes joint_impulses, and bodies that can move.
-// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
-// Double: src/kernels/joint.rs.
+// Reads joints, axes, masses. Writes joint_impulses and movable bodies.
+// No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
+// Twin: src/kernels/joint.rs.
 
 fn solve_joint(rules: Rules, i: u32) {
     if is_converged(rules.measured) { return; }
@@ -13,7 +13,7 @@ fn solve_joint(rules: Rules, i: u32) {
     let y = joint_column(&pair, anchors, vec3f(0.0, 1.0, 0.0));
     let z = joint_column(&pair, anchors, vec3f(0.0, 0.0, 1.0));
 
-    // The gap is pulled shut softly, or not at all in a relax sweep.
+    // The gap is closed softly, or not at all in a relax sweep.
     let before = joint_impulses[i].linear;
     var wanted = relative_velocity(rules, &pair, anchors.r_a, anchors.r_b);
     var mass_scale = 1.0;

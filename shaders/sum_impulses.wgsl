@@ -1,5 +1,6 @@
-// sum_impulses: one thread adds the impulses of one manifold in a substep to those of the substeps before; the first substep begins the sums.
-// Reads contacts, impulses. Writes totals; one thread a manifold. Double: src/kernels/contact.rs.
+// sum_impulses: one thread adds the impulses of one manifold in a substep to the sums of earlier substeps. The first
+// substep begins the sums.
+// Reads contacts, impulses. Writes totals; one thread for each manifold. Twin: src/kernels/contact.rs.
 
 fn sum_contact(is_first: bool, i: u32) {
     let contact = contacts[i];

@@ -1,5 +1,6 @@
-// sum_joint_impulses: one thread adds the impulses of one joint in a substep to those of the substeps before; the first substep begins the sums.
-// Reads joints, joint_impulses. Writes joint_totals; one thread a joint. Double: src/kernels/contact.rs.
+// sum_joint_impulses: one thread adds the impulses of one joint in a substep to the sums of earlier substeps. The first
+// substep begins the sums.
+// Reads joints, joint_impulses. Writes joint_totals; one thread for each joint. Twin: src/kernels/contact.rs.
 
 fn sum_row(is_first: bool, k: u32) {
     let now = joint_impulses[k].linear;

@@ -1,5 +1,5 @@
 // turn_inertias: one thread turns the inverse inertia of one body of a system of joints with the body.
-// Reads turning, bodies. Writes masses; no other thread writes the same one. Double: src/kernels/joint_system.rs.
+// Reads turning, bodies. Writes masses; no other thread writes the same one. Twin: src/kernels/joint_system.rs.
 
 fn turn_inertia(i: u32) {
     let row = turning[i];

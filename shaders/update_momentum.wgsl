@@ -1,6 +1,7 @@
-// update_momentum: one workgroup computes the step of the last sweep from the sums of measure_step, and the factor of the next
-// extrapolation. The factor grows with each sweep. It is zero after a step back, and after a step twice as long as the shortest
-// since the last zero. Reads lengths. Writes momentum. Double: src/kernels/momentum.rs.
+// update_momentum: one workgroup computes the step of the last sweep from the sums of measure_step, and the factor of
+// the next extrapolation. The factor grows with each sweep. It is zero after a step back, and after a step more than
+// twice as long as the shortest since it was last zero.
+// Reads lengths. Writes momentum. Twin: src/kernels/momentum.rs.
 
 fn update_momentum(thread: u32) {
     var own = vec2f();

@@ -1,7 +1,7 @@
-// warm_start: one thread applies the impulses that one manifold carries from the step before.
-// Reads contacts, points, impulses, masses. Writes bodies that can move.
-// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
-// Double: src/kernels/contact.rs.
+// warm_start: one thread applies the carried impulses of one manifold.
+// Reads contacts, points, impulses, masses. Writes movable bodies.
+// No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
+// Twin: src/kernels/contact.rs.
 
 fn warm_start_contact(rules: Rules, i: u32) {
     let contact = contacts[i];

@@ -1,7 +1,7 @@
-// warm_start_joints: one thread applies the impulse that one joint carries from the step before.
-// Reads joints, axes, joint_impulses, masses. Writes bodies that can move.
-// No other thread of this dispatch writes those bodies: colors guarantee it (src/graph.rs).
-// Double: src/kernels/joint.rs.
+// warm_start_joints: one thread applies the carried impulses of one joint.
+// Reads joints, axes, joint_impulses, masses. Writes movable bodies.
+// No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
+// Twin: src/kernels/joint.rs.
 
 fn warm_start_joint(i: u32) {
     let joint = joints[i];

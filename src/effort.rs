@@ -1,15 +1,18 @@
-//! The substeps of each island, from the loads that its contacts bear.
+//! The substeps of each island, from the loads on its contacts.
 //!
-//! A soft contact that bears a force F sags by F/(m w²), m the mass that it feels and w = 2 pi times the contact frequency, which is tied to
-//! the length of a substep (docs/derivation.md, section 5). The settings promise how deep a contact sags at most. An island of class c takes
-//! 2^c times the substeps of the settings, so that its contacts sag 4^-c times as deep, and its class is the lowest that keeps the promise. The
-//! same number decides whether tall and unequal structures stand: a tower sways where the springs of its contacts are soft beside its load.
+//! A soft contact under a force F sags by F/(m w²), where m is its effective mass and w is 2 pi times the contact
+//! frequency, which depends on the length of a substep (docs/derivation.md, section 5). The settings promise a largest
+//! sag. An island of class c takes 2^c times the substeps of the settings, so its contacts sag 4^-c times as deep. Its
+//! class is the lowest that keeps the promise. The same number decides whether tall and uneven structures stand,
+//! because a tower sways if the springs of its contacts are soft for their load.
 //!
-//! A class rises as soon as a load lasts, and falls only after a second in which half of the lower class's promise was kept: a load that is as
-//! large as before never changes a class. The power of two makes the change exact: impulses and preloads scale without rounding.
+//! A class rises as soon as a load lasts. It falls only after a second in which the next lower class would have kept
+//! half of the promise, so a constant load never changes a class. Impulses and preloads scale by powers of two, without
+//! rounding.
 //!
-//! Bodies that others hold inside of each other press the harder the stiffer their springs are, so that every class would ask for the next one.
-//! That force comes from no load: a contact counts at most what the bodies and drives of its island can be as a load.
+//! Bodies that others hold inside each other press harder, the stiffer their springs are, so every class would ask for
+//! the next one. This force comes from no load. The need of a contact is therefore limited by the largest load that the
+//! bodies and drives of its island can cause.
 
 mod island;
 
@@ -24,58 +27,59 @@ use crate::stats::EFFORT_CLASSES;
 use crate::world::{Body, BodyKind, World};
 use island::{HIGHEST, Island};
 
-/// A constraint, for the effort that its island takes.
+/// A contact or joint, for the effort of its island.
 #[derive(Clone, Copy, Debug)]
 pub struct Interface {
     /// One body, or [`IMMOVABLE`].
     pub a: u32,
-    /// The other one.
+    /// The other body, or [`IMMOVABLE`].
     pub b: u32,
-    /// How deep a contact would sag with the substeps of the settings, over the sag that they promise; of a joint the same by its gap.
+    /// The sag of a contact with the substeps of the settings, over the promised sag; for a joint the same ratio of
+    /// gaps.
     pub need: f32,
-    /// The force under which it sags as deep as promised with the substeps of the settings (N).
+    /// The force that makes the promised sag with the substeps of the settings (N).
     pub force: f32,
-    /// The needs of a joint; none of a contact.
+    /// The needs of a joint; `None` for a contact.
     pub joint: Option<JointNeed>,
 }
 
-/// The needs of a joint beside its load. No other joint of its bodies takes load from it.
+/// The needs of a joint besides its load. No other joint of its bodies reduces them.
 #[derive(Clone, Copy, Debug)]
 pub struct JointNeed {
-    /// The most force of its drives (N).
+    /// The largest force of its drives (N).
     pub drives: f32,
-    /// The need by how fast its arms turn.
+    /// The need from the rotation of its arms.
     pub turns: f32,
 }
 
 /// The class of effort of each island.
 #[derive(Debug, Default)]
 pub struct Effort {
-    /// Body by body.
+    /// The class of each body.
     classes: Vec<u8>,
-    /// Steps in which the next lower class would have kept its promise, body by body.
+    /// Steps in which the next lower class would have kept its promise, for each body.
     calm_for: Vec<u8>,
-    /// Bodies that began on others, unbalanced by any forces, and whose islands did not come to rest since.
+    /// Bodies that began on other bodies without a balance of forces, and whose islands have not come to rest since.
     restless: Vec<u32>,
-    /// The need that gives them [`RESTLESS_SUBSTEPS`].
+    /// The need that gives these bodies [`RESTLESS_SUBSTEPS`].
     restless_need: f32,
-    /// The classes of bodies that are awake, ascending; a block each.
+    /// The classes of awake bodies in ascending order, one for each block.
     used: Vec<u8>,
     /// Whether any body, awake or not, is above class 0.
     any_above: bool,
-    /// Whether classes rose since they were decided.
+    /// Whether [`Self::refine`] raised classes since the last decision.
     is_refined: bool,
     highest: u8,
-    /// The class of [`LONG_SUBSTEPS`].
+    /// The class from which a step has [`LONG_SUBSTEPS`].
     long_from: u8,
-    /// Bodies that can be pushed, asleep or not.
+    /// Number of bodies that can be pushed, including those asleep.
     movable: u32,
-    /// Bodies that are awake and can be pushed, class by class.
+    /// Number of awake bodies that can be pushed, for each class.
     counts: [u32; EFFORT_CLASSES],
-    /// Bodies that are awake and not fixed, and whether they can be pushed.
+    /// Awake bodies that are not fixed, and whether each can be pushed.
     awake: Vec<(u32, bool)>,
     islands: Islands,
-    /// The island whose root each body is.
+    /// The island of each root body.
     of_root: Vec<Island>,
 }
 
@@ -137,18 +141,21 @@ impl Saved for Effort {
     }
 }
 
-/// Fewest substeps of an island in which a body began unbalanced, until it rests or falls. Of arches of 13 to 41 wedges,
-/// 0.12 of the radius thick, 4 of 15 stand with 8, 9 with 16 and 10 with 32.
+/// Fewest substeps of an island with a body that began unbalanced, until the body rests or falls. Of 15 arches with 13
+/// to 41 wedges, 0.12 of the radius thick, 4 stand with 8 substeps, 9 with 16 and 10 with 32.
 const RESTLESS_SUBSTEPS: f32 = 32.0;
-/// From so many substeps on a class falls after as many substeps, and not after as many steps: each step costs more.
+/// From this number of substeps on, a class falls after a number of substeps and not of steps, because each step costs
+/// more.
 const LONG_SUBSTEPS: u32 = 64;
-/// What is as fast as after a fall of so long does not come to rest where it began (s).
+/// A body as fast as after a fall of this time does not come to rest in place (s).
 const FALL: f32 = 0.1;
 
-/// The most that a contact bears of the loads of its island, over their sum: what leans on others, as a wedge does, bears more than its weight.
+/// Largest load of a contact, over the sum of the loads of its island. A body that leans on others, as a wedge does,
+/// presses with more than its weight.
 const LEVERAGE: f32 = 4.0;
 
-/// The load that a body can be to its contacts in a step (N): its weight, what pulls it, and what stops it within the step.
+/// The largest load of a body on its contacts in a step (N): its weight, its applied force and torque, and the force
+/// that stops it within the step.
 fn load_of(body: &Body, gravity: Vec3, dt: f32) -> f32 {
     let mass = body.mass.mass;
     let gyration = (body.mass.principal_inertia.max_element() / mass).sqrt();
@@ -156,13 +163,14 @@ fn load_of(body: &Body, gravity: Vec3, dt: f32) -> f32 {
     mass * (gravity.length() + speed / dt) + body.whole_force().length() + body.whole_torque().length() / gyration
 }
 
-/// How a need follows that of the step before: at once down, and up by one class a step, so that the impulse of a hit counts little.
+/// The need after that of the step before. It falls at once and rises by one class in each step, so that the impulse of
+/// a hit counts little.
 pub fn lasting(now: f32, before: f32) -> f32 {
     now.min(4.0 * before + 0.25)
 }
 
 impl Effort {
-    /// The highest class that the settings allow. Sweeps that end by what all bodies do have one class for all.
+    /// The highest class that the settings allow. If the sweeps depend on all bodies together, all have one class.
     fn highest(config: &SolverConfig) -> u8 {
         let is_soft = config.stabilization == Stabilization::Soft;
         if config.method == Method::Accelerated || config.tolerance > 0.0 || !is_soft {
@@ -171,9 +179,9 @@ impl Effort {
         (config.max_substeps / config.substeps).checked_ilog2().unwrap_or(0) as u8
     }
 
-    /// Decides the classes of a step of `dt` seconds; whether any changed. `interfaces` gives the contacts and joints between bodies that are
-    /// awake, where a body counts as movable that a pass moves; `is_above` says whether any needs more than class 0 gives. Where no body is
-    /// above class 0 and none has to be, nothing goes over them.
+    /// Decides the classes of a step of `dt` seconds, and returns whether any changed. `interfaces` gives the contacts
+    /// and joints between awake bodies; a body that a pass moves counts as movable. `is_above` tells whether any needs
+    /// more than class 0 gives. If all bodies are in class 0 and none needs more, the interfaces are not read.
     pub fn follow<I: Iterator<Item = Interface> + Clone>(
         &mut self,
         world: &World,
@@ -208,7 +216,7 @@ impl Effort {
         changed
     }
 
-    /// Takes over bodies that came, went, or changed kind, groups or shapes.
+    /// Follows bodies that were added, removed, or changed in kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         if self.classes.is_empty() {
             return;
@@ -223,12 +231,13 @@ impl Effort {
         self.movable = world.dynamic_count() as u32;
     }
 
-    /// Notes bodies that begin on others, unbalanced by any forces.
+    /// Adds bodies that begin on other bodies without a balance of forces.
     pub fn note_restless(&mut self, bodies: Vec<u32>) {
         self.restless.extend(bodies);
     }
 
-    /// Raises the class of the bodies of an island by two, so that the next step has a quarter of its substep; whether that is possible.
+    /// Raises the class of the bodies of an island by two, which quarters the substep of the next step. Returns whether
+    /// the class could rise.
     pub fn refine(&mut self, bodies: impl Iterator<Item = usize> + Clone) -> bool {
         let class = bodies.clone().map(|i| self.class_of(i)).max().unwrap_or(0);
         if class >= self.highest || self.classes.is_empty() {
@@ -241,9 +250,9 @@ impl Effort {
         true
     }
 
-    /// Classes by the loads of statics.
+    /// Decides the first classes from the loads of statics.
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
-        // Boxes of bodies beside each other may overlap.
+        // The bounding boxes of neighboring bodies may overlap.
         let touches = |upper: usize, gap: f64| gap.abs() < 0.1 * f64::from(world.bodies[upper].smallest_half_extent());
         let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
         let interface = |load: &Load| {
@@ -251,7 +260,7 @@ impl Effort {
             let sag = load.overlap(config.substeps, dt, config);
             let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
             let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
-            // What statics finds is a load, however strong the contact is.
+            // Statics finds true loads, so no limit applies.
             Interface { a, b, need: need as f32, force: 0.0, joint: None }
         };
         let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
@@ -334,7 +343,7 @@ impl Effort {
         changed
     }
 
-    /// Bodies that are awake and can be pushed, class by class, where so many sleep.
+    /// Number of awake bodies that can be pushed, for each class. `asleep` is the number of bodies asleep.
     pub fn counts(&self, asleep: usize) -> [u32; EFFORT_CLASSES] {
         if self.any_above {
             return self.counts;
@@ -344,7 +353,7 @@ impl Effort {
         counts
     }
 
-    /// Whether all bodies are in class 0, asleep or not.
+    /// Whether all bodies, including those asleep, are in class 0.
     pub fn is_one_class(&self) -> bool {
         !self.any_above
     }
@@ -359,7 +368,7 @@ impl Effort {
         self.used.len().max(1)
     }
 
-    /// The block of a body: of bodies that are awake one for each class, ascending.
+    /// The block of a body. Awake bodies have one block for each class, in ascending order.
     pub fn block_of(&self, body: usize) -> usize {
         if self.used.len() < 2 {
             return 0;

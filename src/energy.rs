@@ -23,11 +23,12 @@ use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
 
-/// First, the share of its kinetic energy that an island can regain of its earlier losses. Second, the same for the
-/// weight of a body times its size.
+/// Limits of an island's reserve, the part of its earlier losses that it can regain: the first share of its kinetic
+/// energy, plus the second share of the weight of its bodies times their size.
 const REGAINED: f64 = 1e-3;
 const ROUNDING: f64 = 1e-6;
-/// Largest number of substeps in 1/60 s that add to velocities and not to changes of them.
+/// Largest number of substeps in a step for which rounding of velocities adds up. Shorter substeps sum changes, which
+/// round less.
 const MOST_ROUNDINGS: f64 = 16.0;
 
 /// Share of its energy that an island with joints can gain in a step before it takes shorter substeps.
@@ -657,11 +658,11 @@ fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<
     all
 }
 
-/// Removes the energy `over` (J) from the motion of some bodies, which have `kinetic` in total; if nothing holds them,
-/// without their common motion. If nothing holds them, momentum is conserved: their motion relative to the rigid motion
-/// of all slows down, and the rigid motion becomes the one with the momentum `from_start`. Positions can be so wrong
-/// that the rotation with this angular momentum has more energy than is left. Then the rotation is reduced if the
-/// excess is at most the share [`COARSE`]. Otherwise nothing changes and the result is false.
+/// Removes the energy `over` (J) from the motion of some bodies, which have `kinetic` in total. If nothing holds them,
+/// momentum is conserved: their motion relative to the rigid motion of all slows down, and the rigid motion becomes the
+/// one with the momentum `from_start`. If the rotation with this angular momentum has more energy than is left, because
+/// positions are wrong, the rotation is reduced if the excess is at most the share [`COARSE`]. Otherwise nothing
+/// changes and the result is false. If something holds the bodies, their whole motion slows down.
 fn brake(
     world: &World,
     problem: &mut StepProblem,

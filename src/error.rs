@@ -76,7 +76,7 @@ impl Error {
     }
 }
 
-/// A text on one line, whatever a file or a caller put into it.
+/// A text on one line, even if a file or a caller put line breaks into it.
 fn one_line(text: impl std::fmt::Display) -> String {
     text.to_string().replace(char::is_control, " ")
 }

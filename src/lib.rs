@@ -19,7 +19,7 @@
 //! | To | call |
 //! |---|---|
 //! | build a world | [`World`], [`Body`], [`Shape`], [`Joint`]; or find a scene of the catalogue or a file in `drystone-scenes` |
-//! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a largest overlap |
+//! | choose settings | [`SolverConfig`], [`Preset`](preset::Preset), [`Load`](load::Load) for a limit on the overlap |
 //! | choose a backend for the sweeps | [`Cpu`], [`Reference`], `Gpu`, or [`choose`](backend::choose) |
 //! | step | [`Simulation::step`], which gives [`StepStats`] |
 //! | step many independent worlds | [`batch::Batch`] |

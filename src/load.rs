@@ -1,8 +1,9 @@
 //! The load on the heaviest interface of a world, and the number of substeps that keep its overlap small.
 //!
-//! A soft contact at rest overlaps by s = F/(m w²), F the force on one of its points, m the mass that the point feels and
-//! w = 2 pi times the contact frequency, which is tied to the substep (docs/derivation.md, section 5). So the overlap of
-//! whatever stands falls with the square of the substeps, and is known before the first step.
+//! A soft contact at rest overlaps by s = F/(m w²), where F is the force on one of its points, m is the effective mass
+//! of the point, and w is 2 pi times the contact frequency, which depends on the length of a substep
+//! (docs/derivation.md, section 5). The overlap of a standing structure therefore falls with the square of the number
+//! of substeps, and is known before the first step.
 
 use std::f64::consts::TAU;
 
@@ -16,12 +17,13 @@ use crate::error::{Error, Result, input};
 use crate::math::rotation::product;
 use crate::world::{Body, BodyKind, World, placed, pose};
 
-/// Most substeps that the settings take.
+/// Largest number of substeps that the settings accept.
 const MOST_SUBSTEPS: f64 = 4096.0;
-/// Bodies share the load of a body above where their tops are within this of the highest top, relative to the height of the body above.
+/// The bodies beneath a body share its load if their tops are within this distance of the highest top, relative to the
+/// height of the upper body.
 const LEVEL: f64 = 0.1;
 
-/// The interface that sinks in deepest.
+/// The load of one body on another.
 ///
 /// ```
 /// use drystone::{Body, Shape, SolverConfig, World, glam::Vec3, load::Load};
@@ -44,35 +46,38 @@ const LEVEL: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Load {
-    /// The body that is borne.
+    /// The upper body.
     pub upper: usize,
-    /// The body that bears it.
+    /// The body that supports it.
     pub lower: usize,
     /// Force between the two (N).
     pub force: f64,
-    /// Overlap times the square of w (m/s²): the force on one point over the mass that the point feels.
+    /// Overlap times the square of w (m/s²): the force on one point over its effective mass.
     pub stress: f64,
     /// Distance between the boxes around the two, along gravity (m).
     pub gap: f64,
 }
 
 impl Load {
-    /// The deepest interface of `world` if it stands as it is, or falls straight down; none if no body bears another.
+    /// The interface of `world` with the deepest overlap, if the world stands as it is or falls straight down; `None`
+    /// if no body supports another.
     ///
-    /// Every body hands on its weight, and what it bears itself, to the bodies below it in proportion to the area by which
-    /// their bounding boxes overlap seen from above. A ball touches in one point, everything else in four corners.
+    /// Every body passes its weight, and the load on it, to the bodies beneath it. Their shares are proportional to the
+    /// areas of their bounding boxes that lie beneath its own. A ball touches at one point, and other shapes at four
+    /// corners.
     pub fn heaviest(world: &World, config: &SolverConfig) -> Option<Self> {
         let deeper = |a: Self, b: Self| if b.stress > a.stress { b } else { a };
         Self::all(world, config, |_, _| true).into_iter().reduce(deeper)
     }
 
-    /// The interfaces of `world`, as those of [`Self::heaviest`], that are wanted by their upper bodies and their gaps (m).
+    /// The wanted interfaces of `world`, with loads as in [`Self::heaviest`]. `is_wanted` gets the upper body and the
+    /// gap of each (m).
     pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
         let ups: Vec<DMat3> = (0..world.world_count()).map(|part| up(world.gravity_of(part))).collect();
         let up_of = |i: usize| ups[world.bodies.worlds()[i] as usize];
         let boxes = upright_boxes(world, up_of);
         let ground = Ground::new(&boxes, world);
-        // What rises presses on nothing below.
+        // A body that gravity lifts presses on nothing beneath it.
         let weight = |(&part, b): (&u32, &Body)| {
             let gravity = world.gravity_of(part as usize).as_dvec3().length();
             f64::from(b.mass.mass) * gravity * f64::from(b.gravity_scale).max(0.0)
@@ -104,13 +109,13 @@ impl Load {
         self.stress / (w * w)
     }
 
-    /// Fewest substeps of a step of `dt` seconds with which the overlap is at most `most` (m).
+    /// Fewest substeps of a step of `dt` seconds that keep the overlap within `most` (m).
     ///
     /// # Errors
-    /// There are more than the settings take, or contacts are not soft, so that no law says how deep they get.
+    /// The number is larger than the settings accept, or contacts are not soft and their overlap has no known limit.
     pub fn substeps(&self, most: f64, dt: f32, config: &SolverConfig) -> Result<u32> {
         if config.stabilization != Stabilization::Soft {
-            return Err(Error::input("a largest penetration is a promise of soft contacts: set stabilization=soft"));
+            return Err(Error::input("a limit on penetration needs soft contacts: set stabilization=soft"));
         }
         let substeps = (self.overlap(1, dt, config) / most).sqrt().ceil().max(1.0);
         if substeps <= MOST_SUBSTEPS {
@@ -125,7 +130,7 @@ impl Load {
     }
 }
 
-/// Force on one point over the mass that it feels, and over the square of what its frequency is multiplied by.
+/// Force on one point, over its effective mass and over the square of the factor on its frequency.
 fn stress(
     world: &World,
     (boxes, up): (&[Box3], DMat3),
@@ -144,7 +149,7 @@ fn stress(
     force / if one_point { 1.0 } else { 4.0 } * inverse_mass / f64::from(ratio * ratio)
 }
 
-/// 1/m of a point of a body along `normal` (1/kg).
+/// Inverse effective mass of a point of a body along `normal` (1/kg).
 fn inverse_mass_at(body: &Body, at: DVec3, normal: DVec3) -> f64 {
     if body.kind != BodyKind::Dynamic {
         return 0.0;
@@ -160,7 +165,7 @@ fn up(gravity: Vec3) -> DMat3 {
     DMat3::from_quat(glam::DQuat::from_rotation_arc(up, DVec3::Y))
 }
 
-/// A box along the axes that [`up`] turns to.
+/// A box along the axes of a world turned by [`up`].
 #[derive(Clone, Copy)]
 struct Box3 {
     low: DVec3,
@@ -181,7 +186,7 @@ impl Box3 {
     }
 }
 
-/// The bounding box of each body, turned by `up_of` its world; empty without shapes. A half-space is as wide as the world.
+/// The bounding box of each body, turned by `up_of`; empty without shapes. A half-space is as wide as the world.
 fn upright_boxes(world: &World, up_of: impl Fn(usize) -> DMat3) -> Vec<Box3> {
     let empty = Box3 { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
     let of = |(i, b): (usize, &Body)| {
@@ -201,7 +206,8 @@ fn upright_boxes(world: &World, up_of: impl Fn(usize) -> DMat3) -> Vec<Box3> {
     world.bodies.iter().enumerate().map(of).collect()
 }
 
-/// How deep the searches go after one of a body's height found nothing that bears the body, in its heights. The last one has no end.
+/// Depths of the searches that follow if a search to the depth of one height of the body found no support, in heights
+/// of the body. The last search has no limit.
 const DEPTHS: [f64; 2] = [4.0, 16.0];
 /// Farther than any body is (m), and small enough for areas in single precision.
 const FAR: f64 = 1e15;
@@ -210,10 +216,10 @@ fn aabb(low: DVec3, high: DVec3) -> Aabb {
     Aabb::new(low.max(DVec3::splat(-FAR)).as_vec3(), high.min(DVec3::splat(FAR)).as_vec3())
 }
 
-/// The boxes of all bodies that have shapes, to be asked for those under a body of the same world.
+/// The boxes of all bodies with shapes, for searches of the bodies beneath a body of the same world.
 struct Ground<'a> {
     boxes: &'a [Box3],
-    /// The world of each body, and a tree over the boxes of each world with the bodies that its leaves stand for.
+    /// The world of each body. For each world, a tree over its boxes, and the body of each leaf.
     worlds: &'a [u32],
     trees: Vec<(Bvh, Vec<usize>)>,
 }
@@ -222,16 +228,17 @@ impl<'a> Ground<'a> {
     fn new(boxes: &'a [Box3], world: &'a World) -> Self {
         let tree = |mut own: Vec<usize>| {
             own.retain(|&i| !boxes[i].is_empty());
-            // parry takes the leaves of a tree of one or two to be 0 and 1.
+            // parry assumes that a tree with one or two leaves has the leaves 0 and 1.
             let leaves = own.iter().map(|&i| aabb(boxes[i].low, boxes[i].high)).enumerate();
             (Bvh::from_iter(BvhBuildStrategy::Binned, leaves), own)
         };
         Self { boxes, worlds: world.bodies.worlds(), trees: world.worlds().into_iter().map(tree).collect() }
     }
 
-    /// The bodies that bear `upper`, with the areas by which they overlap it from above.
+    /// The bodies that support `upper`, with the areas of their boxes beneath its own.
     ///
-    /// The search goes as deep as the boxes that it finds bear: in a pile, all that is under a body is a column of dozens of boxes.
+    /// The search goes no deeper than the boxes that it finds as supports. In a pile, the column beneath a body has
+    /// dozens of boxes.
     fn supports(&self, upper: usize) -> Vec<(usize, f64)> {
         let above = &self.boxes[upper];
         let height = above.high.y - above.low.y;
@@ -250,7 +257,8 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// The bodies whose boxes end above `floor` and below the middle of `upper`, and overlap it from above, by so much.
+    /// The bodies whose boxes end above `floor` and below the middle of `upper`, and lie beneath it, with the shared
+    /// areas.
     fn boxes_between(&self, upper: usize, floor: f64) -> Vec<(usize, f64)> {
         let above = &self.boxes[upper];
         let middle = above.low.y + 0.5 * (above.high.y - above.low.y);
@@ -288,7 +296,7 @@ mod tests {
         }
     }
 
-    /// Boxes of many sizes in a high and narrow space, so that bodies rest on near ones, on far ones and on nothing.
+    /// Boxes of many sizes in a high and narrow space, so that bodies rest on near bodies, on far ones and on nothing.
     #[test]
     fn the_search_for_what_bears_finds_it_at_any_depth() {
         let mut random = SplitMix64::new(7);
@@ -353,7 +361,7 @@ mod tests {
         };
         world.bodies[2].gravity_scale = 3.0;
         assert!((lowest(&world).force - 4.0 * 9810.0).abs() < 0.1);
-        // What rises presses on nothing.
+        // A body that gravity lifts presses on nothing.
         world.bodies[2].gravity_scale = -1.0;
         let load = lowest(&world);
         assert!((load.force - 9810.0).abs() < 0.1);

@@ -31,13 +31,14 @@ pub trait Lane:
 {
     /// The result of a comparison of two lanes.
     type Mask: Copy;
-    /// Number of kept numbers in a column of three. With one more, a column of single numbers fills a register.
+    /// Number of values to compute in a column of three. A fourth value lets a column of single numbers fill a
+    /// register.
     const COLUMN: usize = 3;
     /// The same constant in every lane.
     fn constant(x: f64) -> Self;
     /// Whether `self > other`; false for NaN.
     fn gt(self, other: Self) -> Self::Mask;
-    /// Both.
+    /// Whether both masks are true.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// The same truth value in every lane.
     fn mask(value: bool) -> Self::Mask;

@@ -18,7 +18,7 @@ pub const BODY: f64 = 2000.0;
 pub fn check(bytes: f64, what: impl Display) -> Result<()> {
     match available().filter(|&there| bytes > there) {
         Some(there) => Err(Error::TooLarge(format!(
-            "{what}: at least {:.1} GB of memory, of which {:.1} GB are available",
+            "{what}: at least {:.1} GB of memory needed, {:.1} GB available",
             bytes * 1e-9,
             there * 1e-9
         ))),
@@ -56,7 +56,7 @@ mod tests {
         assert!(check(1e3, "little").is_ok());
         if cfg!(target_os = "linux") {
             let message = check(1e18, "much").expect_err("an exabyte").to_string();
-            assert!(message.starts_with("much: at least 1000000000.0 GB of memory, of which "), "{message}");
+            assert!(message.starts_with("much: at least 1000000000.0 GB of memory needed, "), "{message}");
         }
     }
 }

@@ -31,7 +31,7 @@ macro_rules! named {
             type Err = $crate::Error;
 
             fn from_str(name: &str) -> $crate::Result<Self> {
-                let unknown = || $crate::Error::input(format!("{name:?} is none of {}", Self::NAMES.join(", ")));
+                let unknown = || $crate::Error::input(format!("{name:?}: must be one of {}", Self::NAMES.join(", ")));
                 Self::ALL.into_iter().find(|value| value.name() == name).ok_or_else(unknown)
             }
         }

@@ -101,7 +101,7 @@ struct Unfinished {
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub struct Simulation {
-    /// The bodies, with moments of inertia raised where they are too small
+    /// The bodies, with moments of inertia raised if they are too small
     /// ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)). The caller can change all of it
     /// between steps: insert and remove bodies and joints, and set gravity, poses, velocities, forces, masses,
     /// materials, kinds and shapes. The next step finds the changes, and refuses a world that [`World::check`] refuses.
@@ -451,7 +451,7 @@ impl Simulation {
     }
 
     /// A view of the bodies at their present poses, for rays, shape casts, points and boxes. It uses the tree of the
-    /// last step, so the cost is one look at each body. Keep the view for many queries.
+    /// last step, so its cost is proportional to the number of bodies. Keep the view for many queries.
     ///
     /// ```
     /// use drystone::queries::Filter;

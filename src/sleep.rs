@@ -1,11 +1,17 @@
-//! Bodies that lie still are left alone until something disturbs them.
+//! Bodies that lie still fall asleep until something disturbs them.
 //!
-//! Bodies that touch, or that a joint holds together, form an island. An island whose bodies were all slow for a while falls
-//! asleep as a whole: its bodies stay where they are to the last bit, and no stage of a step works on them. It wakes as a
-//! whole when a body that is awake comes near enough to make contact, when a kinematic body that moves touches it or is tied to it, or when
-//! the caller changes the pose or velocity of one of its bodies, a force, torque or gravity on it, or the pose of a body under it or at the other
-//! end of one of its joints. A body that
-//! touches nothing never sleeps, nor does an island of a body that may not (`Body::can_sleep`), nor an island of which a body still comes out of another. Everything is decided in the order of bodies and pairs, whatever the number of threads.
+//! Bodies that touch, or that a joint connects, form an island. If all bodies of an island have been slow for some
+//! time, the whole island falls asleep. Its bodies then keep their exact poses, and no stage of a step works on them.
+//! An island wakes as a whole in one of these cases:
+//!
+//! - An awake body comes near enough to make contact.
+//! - A moving kinematic body touches a body of the island or is connected to it.
+//! - The caller changes the pose or velocity of one of its bodies, or a force, torque or gravity on it.
+//! - The caller changes the pose of a body beneath it or at the other end of one of its joints.
+//!
+//! Three things keep an island awake: a body that touches nothing, a body that may not sleep (`Body::can_sleep`), and a
+//! body that still comes out of another body. All decisions follow the order of bodies and pairs, so they do not depend
+//! on the number of threads.
 
 use glam::{Quat, Vec3};
 
@@ -25,7 +31,7 @@ struct Snapshot {
     angular_velocity: Vec3,
     force: Vec3,
     torque: Vec3,
-    /// The gravity that it feels.
+    /// The gravity on the body.
     gravity: Vec3,
 }
 
@@ -52,26 +58,27 @@ impl Snapshot {
     }
 }
 
-/// Which bodies sleep, and since when the others are slow.
+/// The bodies that sleep, and the times for which the others have been slow.
 #[derive(Debug, Default)]
 pub struct Sleep {
-    /// Seconds that an island has to be slow; 0 if nothing ever sleeps.
+    /// Time for which an island has to be slow (s); 0 if nothing ever sleeps.
     after: f32,
     speed: f32,
-    /// Whether each body sleeps; empty if nothing ever does.
+    /// Whether each body sleeps; empty if nothing ever sleeps.
     asleep: Vec<bool>,
-    /// The activity of each body for the detection; empty likewise.
+    /// The activity of each body for the detector; empty if nothing ever sleeps.
     activity: Vec<Activity>,
     /// How long each body has been slow (s).
     slow_for: Vec<f32>,
-    /// Radius around the origin of each body that holds its shapes (m).
+    /// Radius around the origin of each body that encloses its shapes (m).
     reach: Vec<f32>,
-    /// Bodies that sleep, and those that cannot be pushed, as they were left. The detector keeps poses of all bodies as well
-    /// ([`Detector::note_left`]): it needs those of bodies that are awake, and no velocities and forces. This list has what wakes a body, or
-    /// nothing that equals anything where a body is disturbed, and is empty where nothing sleeps.
+    /// The last state of bodies that sleep, and of those that cannot be pushed. The detector also keeps poses of all
+    /// bodies ([`Detector::note_left`]), but it needs those of awake bodies, and no velocities and forces. The state
+    /// here decides whether a body wakes. A disturbed body has a state that equals nothing. Empty if nothing ever
+    /// sleeps.
     left: Vec<Snapshot>,
     islands: Islands,
-    /// The next body of the island, around; of bodies that sleep.
+    /// The next body in the ring of the island, for bodies that sleep.
     next: Vec<u32>,
     count: usize,
     steps: u32,
@@ -90,12 +97,13 @@ crate::saved::cloned!(Sleep {
     steps,
 } scratch { islands });
 
-/// The overlap from which on a body has to lie still, over the sag that the settings promise: preloads lift what rests out of deeper overlaps.
+/// Overlap, relative to the promised sag, above which a body that still comes out of another stays awake. Preloads lift
+/// resting bodies out of deeper overlaps.
 const DEEP: f32 = 0.25;
-/// A body comes out of another if it does so within so long (s), as fast as it is now.
+/// A body comes out of another if its present speed ends the overlap within this time (s).
 const COMING_OUT: f32 = 10.0;
 
-/// Whether bodies that overlap come apart.
+/// Whether overlapping bodies separate.
 fn comes_out(pair: &Pair, world: &World, config: &SolverConfig) -> bool {
     let deep = DEEP * config.promised_sag(pair.size);
     let going_on = pair.manifolds.iter().filter(|manifold| !manifold.has_ended());
@@ -103,20 +111,20 @@ fn comes_out(pair: &Pair, world: &World, config: &SolverConfig) -> bool {
     points.any(|(overlap, parting)| overlap > deep && COMING_OUT * parting > overlap)
 }
 
-/// Bodies that touch each other, and those that a joint ties to each other or to the world.
+/// Bodies that touch each other, and bodies that a joint connects to each other or to the world.
 fn touching_or_tied(world: &World, detector: &Detector) -> impl Iterator<Item = (usize, Option<usize>)> {
     let touching = detector.pairs().filter(|p| p.is_touching()).map(|p| (p.body_a as usize, Some(p.body_b as usize)));
     let joints = world.joints.iter().filter(|joint| !joint.holds_nothing());
     touching.chain(joints.map(Joint::indices))
 }
 
-/// Islands are looked for in every so many steps.
+/// Number of steps between two searches for islands.
 const EVERY: u32 = 8;
 
-/// What [`Sleep::walk`] does with the state in which a body was left.
+/// How [`Sleep::walk`] writes the state in which a body was left.
 #[derive(Clone, Copy, PartialEq)]
 enum Left {
-    /// A body that is awake and can be pushed has none.
+    /// Awake bodies that can be pushed have no such state.
     Unused,
     AsTheBody,
     Other,
@@ -125,7 +133,7 @@ enum Left {
 crate::saved::kinds!(Left { Unused, AsTheBody, Other });
 
 impl Sleep {
-    /// Writes all that lasts, or reads it: for the bodies of `world`, whose kinds were `kinds` in the step before.
+    /// Writes the lasting state, or reads it, for the bodies of `world`. `kinds` are their kinds in the step before.
     pub fn walk<A: Archive>(&mut self, world: &World, kinds: &[BodyKind], archive: &mut A) -> Result<()> {
         let Self { after, speed, asleep, activity, slow_for, reach, left, islands: _, next, count, steps } = self;
         after.walk(archive)?;
@@ -177,7 +185,7 @@ impl Sleep {
         Ok(())
     }
 
-    /// Everything is awake.
+    /// A state with all bodies awake.
     pub fn new(world: &World, config: &SolverConfig) -> Self {
         if config.sleep_after == 0.0 {
             return Self::default();
@@ -198,8 +206,8 @@ impl Sleep {
         }
     }
 
-    /// Takes over other settings. All bodies wake where anything but the settings of sleeping changes: what they rested on may
-    /// hold them no longer.
+    /// Follows a change of settings. All bodies wake if any settings but those of sleep change, because their supports
+    /// may no longer hold them.
     pub fn change_settings(&mut self, world: &World, before: &SolverConfig, now: &SolverConfig) {
         let SolverConfig { sleep_after, sleep_speed, .. } = *now;
         if self.asleep.is_empty() || sleep_after == 0.0 {
@@ -212,7 +220,8 @@ impl Sleep {
         }
     }
 
-    /// Takes over bodies that came, went, or changed kind, groups or shapes. They are awake, and wake what touches them.
+    /// Follows bodies that were added, removed, or changed in kind, groups or shapes. These are awake, and wake the
+    /// bodies that touch them.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         if self.after == 0.0 {
             return;
@@ -239,22 +248,22 @@ impl Sleep {
         &self.asleep
     }
 
-    /// The activity of each body for the detection; empty if nothing ever sleeps.
+    /// The activity of each body for the detector; empty if nothing ever sleeps.
     pub fn activity(&self) -> &[Activity] {
         &self.activity
     }
 
-    /// Bodies that sleep.
+    /// Number of bodies that sleep.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Whether a step would change nothing: something sleeps, and nothing else moves.
+    /// Whether a step would change nothing: some bodies sleep, and no others move.
     pub fn is_everything_still(&self) -> bool {
         self.count > 0 && self.activity.iter().all(|a| *a == Activity::Still)
     }
 
-    /// Wakes what was changed since the last step, and what touches what moves by itself.
+    /// Wakes the bodies that were changed since the last step, and those that touch active bodies.
     pub fn before_step(&mut self, world: &World, detector: &Detector) {
         for i in 0..self.asleep.len() {
             let body = &world.bodies[i];
@@ -272,7 +281,7 @@ impl Sleep {
         self.wake_touched(world, detector);
     }
 
-    /// Wakes what sleeps and is touched by, or tied to, what does not; returns whether that was anything.
+    /// Wakes sleeping bodies that touch active bodies or are connected to them. Returns whether there were any.
     pub fn wake_touched(&mut self, world: &World, detector: &Detector) -> bool {
         let before = self.count;
         if before > 0 && self.activity.iter().any(|a| *a != Activity::Still) {
@@ -300,7 +309,8 @@ impl Sleep {
         }
     }
 
-    /// Wakes a body that the caller changed. A body that never sleeps wakes what touches it in the next step.
+    /// Wakes a body that the caller changed. A change of a body that never sleeps wakes the bodies that touch it in the
+    /// next step.
     pub fn disturb(&mut self, body: usize) {
         self.wake(body);
         if let Some(left) = self.left.get_mut(body) {
@@ -309,7 +319,8 @@ impl Sleep {
         }
     }
 
-    /// Notes which bodies were slow in a step of `dt` seconds, and lets islands fall asleep that were slow for long enough.
+    /// Records which bodies were slow in a step of `dt` seconds, and lets islands fall asleep that were slow for long
+    /// enough.
     pub fn after_step(&mut self, world: &mut World, detector: &Detector, config: &SolverConfig, dt: f32) {
         let mut ready = false;
         for (i, body) in world.bodies.iter().enumerate().take(self.asleep.len()) {
@@ -328,7 +339,7 @@ impl Sleep {
     }
 
     fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector, config: &SolverConfig) {
-        // Islands of bodies that are awake; bodies that something holds; bodies that touch a driven body.
+        // Islands of awake bodies, the bodies that something holds, and the bodies that touch a driven body.
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut held = vec![false; self.asleep.len()];
         let mut driven = vec![false; self.asleep.len()];

@@ -154,7 +154,7 @@ pub struct Traffic {
     pub up: u64,
     /// Bytes read back.
     pub down: u64,
-    /// Number of dispatches, including those that bring rows to their places; 0 without a device.
+    /// Number of dispatches, including those that move rows to their places; 0 without a device.
     pub dispatches: usize,
     /// Number of submissions: more than one if a single one would hold the device too long.
     pub submissions: usize,

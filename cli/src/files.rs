@@ -166,7 +166,7 @@ pub fn rows<R: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<R>> {
     parsed.map_err(|e| {
         let line = e.position().map_or(1, csv::Position::line);
         let path = path.display();
-        Error::input(format!("{path}: line {line}: not a row of this version; move the file away to begin anew"))
+        Error::input(format!("{path}: line {line}: not a row of this version; move the file away to start again"))
     })
 }
 

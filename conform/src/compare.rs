@@ -197,7 +197,7 @@ impl std::fmt::Display for FirstDifference {
             Stage::Rows { rows } => write!(f, "before the first pass: {rows} of the problem"),
             Stage::Pass { pass, passes, kernel } => write!(f, "pass {pass} of {passes}, {kernel}"),
             Stage::NotRepeated { .. } => {
-                write!(f, "which did not differ when it was repeated: the same input gives different bits")
+                write!(f, "the difference did not appear again: the same input gives different bits")
             }
         }
     }

@@ -45,7 +45,7 @@ impl Map {
         if path.extension().is_none() && !path.exists() {
             let known = BOARDS.map(|b| b.0);
             let hint = hint(name_or_path, known, format_args!("known boards: {}", known.join(", ")));
-            return Err(Error::input(format!("{name_or_path:?} is no board and no file{hint}")));
+            return Err(Error::input(format!("{name_or_path:?} is neither a board nor a file{hint}")));
         }
         let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
         Self::parse(name_or_path, &text)
@@ -78,7 +78,7 @@ impl Map {
                     'O' => (Cell::Hole, None),
                     'S' => (Cell::Floor, Some((&mut start, "start"))),
                     'G' => (Cell::Floor, Some((&mut goal, "goal"))),
-                    _ => return refuse(line, column + 1, format!("{symbol:?} is none of . # O S G")),
+                    _ => return refuse(line, column + 1, format!("{symbol:?}: must be one of . # O S G")),
                 };
                 if let Some((found, what)) = special {
                     if found.is_some() {
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn a_bad_map_is_refused_with_line_and_column() {
-        assert_eq!(refusal("S.\n.xG\n"), "m: line 2, column 2: 'x' is none of . # O S G");
+        assert_eq!(refusal("S.\n.xG\n"), "m: line 2, column 2: 'x': must be one of . # O S G");
         assert_eq!(refusal("; a comment\nS.G\n..\n"), "m: line 3, column 3: 2 cells; the first row has 3");
         assert_eq!(refusal("S.\n..G\n"), "m: line 2, column 3: 3 cells; the first row has 2");
         assert_eq!(refusal("S.S\n..G\n"), "m: line 1, column 3: a second start");

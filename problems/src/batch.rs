@@ -65,14 +65,14 @@ pub enum Measure {
     Asleep,
     /// 1 if all numbers are finite, else 0.
     Finite,
-    /// How far the first substep of the next step leaves impulses from solving its contacts, in velocities ([`Residuals::e_vel`]). The step is made on
-    /// a copy. NaN of a world with joints, as the three that follow.
+    /// Natural map of the impulses after the first substep of the next step, in velocities ([`Residuals::e_vel`]). The
+    /// step runs on a copy. This residual and the next three are NaN for a world with joints.
     ResidualVelocity,
-    /// Farthest that an impulse is outside of its cone of friction ([`Residuals::cone`], N s).
+    /// Largest distance of an impulse from its friction cone ([`Residuals::cone`], N s).
     ResidualCone,
-    /// Largest impulse of a contact times the speed at which it parts ([`Residuals::compl`], J).
+    /// Largest product of a normal impulse and the normal speed of its contact ([`Residuals::compl`], J).
     ResidualComplementarity,
-    /// Largest power of friction that does not oppose its slip ([`Residuals::diss`], J).
+    /// Largest deviation of friction from full opposition to the slip ([`Residuals::diss`], J).
     ResidualDissipation,
 }
 
@@ -155,7 +155,7 @@ impl Measure {
     }
 }
 
-/// The residuals of the next step, made on a copy; none of a world with joints, or where the step fails.
+/// The residuals of the next step, which runs on a copy. `None` for a world with joints, or if the step fails.
 fn of_next_step(member: &Member) -> Option<Residuals> {
     if !member.simulation().world.joints.is_empty() {
         return None;

@@ -1,10 +1,10 @@
-//! Contact problems at the level of velocities, without poses and without a world, and everything that solves and
-//! measures them. It stands on [`drystone`], whose steps it can write as problems.
+//! Contact problems at the level of velocities, without poses and without a world: formats, solvers and error measures.
+//! This crate builds on [`drystone`], and can extract problems from its steps.
 //!
 //! | To | call |
 //! |---|---|
 //! | write, read or build a problem | [`ContactProblem`], [`contacts`] |
-//! | take the problem out of a step | [`step_with_contacts`], [`ContactProblem::of_step`] |
+//! | extract the problem of a step | [`step_with_contacts`], [`ContactProblem::of_step`] |
 //! | measure errors of impulses | [`Residuals`], [`step_with_residuals`], [`batch::Measure`] |
 //! | solve by sweeps on any backend | [`Solver`](solver::Solver) |
 //! | solve in double precision | [`newton`](solver::newton), [`solution`](solver::solution) |

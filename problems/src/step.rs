@@ -29,8 +29,8 @@ pub fn step_with_contacts(simulation: &mut Simulation, name: &str, dt: f32) -> R
     step(simulation, name, dt, problem, &plan)
 }
 
-/// Moves the world by `dt` seconds and returns the residuals of the impulses after the first substep, which
-/// [`Reference`] computes a second time. They are zero if no awake bodies touch.
+/// Advances the world by `dt` seconds, and returns the residuals of the impulses after the first substep. [`Reference`]
+/// computes that substep a second time. The residuals are zero if no awake body touches another.
 ///
 /// ```
 /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
@@ -43,7 +43,7 @@ pub fn step_with_contacts(simulation: &mut Simulation, name: &str, dt: f32) -> R
 /// ```
 ///
 /// # Errors
-/// As [`step_with_contacts`].
+/// Those of [`step_with_contacts`].
 pub fn step_with_residuals(simulation: &mut Simulation, dt: f32) -> Result<Residuals> {
     const NAME: &str = "the world";
     check(simulation, NAME)?;
@@ -63,7 +63,7 @@ pub fn step_with_residuals(simulation: &mut Simulation, dt: f32) -> Result<Resid
     Ok(Residuals::of(&contacts, &impulses))
 }
 
-/// Refuses a world whose constraints a contact problem cannot have.
+/// Refuses a world with constraints that a contact problem cannot have.
 fn check(simulation: &Simulation, name: &str) -> Result<()> {
     let world = &simulation.world;
     if !world.joints.is_empty() {
@@ -73,13 +73,13 @@ fn check(simulation: &Simulation, name: &str) -> Result<()> {
     if let Some(i) = world.bodies.iter().position(Body::has_locked_rotation) {
         let name = &world.bodies[i].name;
         return Err(Error::input(format!(
-            "body {i} {name:?} has locked rotations: a body of a contact problem turns freely"
+            "body {i} {name:?} has locked rotations: a contact problem cannot have locked rotations"
         )));
     }
     Ok(())
 }
 
-/// Makes the step, which begins as `problem` and `plan` say.
+/// Makes the step that begins with `problem` and `plan`.
 fn step(
     simulation: &mut Simulation,
     name: &str,

@@ -1,4 +1,4 @@
-"""Many worlds at once."""
+"""Batches of worlds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Result = TypeVar("Result")
 
-# Name, and the numbers of a body or joint.
+# Columns by name, each with the number of values per body or joint.
 VIEWS = {"position": 3, "rotation": 4, "linear_velocity": 3, "angular_velocity": 3}
 INPUTS = {"force": 3, "torque": 3, "gravity": 3, "ctrl": 1}
 ON_REQUEST = {
@@ -60,17 +60,17 @@ MEASURES = (
     "residual_complementarity",
     "residual_dissipation",
 )
-# Side of a picture.
+# Largest side of a picture (pixels).
 MOST_PIXELS = 8192
 LISTEN = ("contacts", "impulses", "hits")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
 
 
 class WorldError(RuntimeError):
-    """Some worlds failed; they are as before the step that failed, and all others are through.
+    """Some worlds failed. They are in the state before the failed step, and all other worlds completed the call.
 
-    `worlds` has their numbers and `messages` a line for each. After `rollout`, `records` has what was recorded: NaN where a world
-    did not come.
+    `worlds` has their indices, and `messages` has one line for each. After `rollout`, `records` has the recorded
+    values, and NaN for records that a world did not reach.
     """
 
     def __init__(self, worlds: NDArray[np.int64], messages: list[str]) -> None:
@@ -85,7 +85,7 @@ class WorldError(RuntimeError):
 
 
 def wxyz(rotation: ArrayLike) -> NDArray[Any]:
-    """Rotations x y z w in the order w x y z.
+    """Convert rotations from the order x y z w to w x y z.
 
     >>> import drystone as ds
     >>> ds.wxyz([0, 0, 0, 1]).tolist()
@@ -95,7 +95,7 @@ def wxyz(rotation: ArrayLike) -> NDArray[Any]:
 
 
 class Snapshots:
-    """States of some worlds, in memory. Pickled they are bytes.
+    """States of some worlds, in memory. They are pickled as bytes.
 
     >>> import drystone as ds, pickle
     >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
@@ -111,9 +111,9 @@ class Snapshots:
 
     @classmethod
     def from_bytes(cls, states: Sequence[bytes]) -> Self:
-        """States that `Batch.save` or `to_bytes` made.
+        """Load states from the bytes of `Batch.save` or `to_bytes`.
 
-        ValueError: bytes that are none of a world, of another version, damaged or cut short.
+        ValueError: the bytes are not a saved world, have another version, or are damaged or cut short.
         """
         if isinstance(states, (bytes, bytearray)):
             raise ValueError("states is bytes: must be a list of bytes, one a world")
@@ -130,12 +130,12 @@ class Snapshots:
 
     @property
     def steps(self) -> NDArray[np.uint64]:
-        """The steps of each state since the start."""
+        """Number of steps of each state since the start."""
         return np.array([state.steps for state in self._states], np.uint64)
 
     @property
     def time(self) -> Doubles:
-        """The time of each state since the start (s)."""
+        """Time of each state since the start (s)."""
         return np.array([state.time for state in self._states], np.float64)
 
     def __len__(self) -> int:
@@ -153,11 +153,12 @@ class Snapshots:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts of some worlds. Those of one world stand together, ascending by the pair of bodies, and so do the points of a contact.
+    """Contacts of some worlds. The contacts of one world are contiguous, sorted by pairs of bodies, and so are the
+    points of one contact.
 
-    `world_start` [w + 1], `bodies` [N, 2], `normal` [N, 3] from the first to the second, `impulse` [N, 3] on the second (N s, of the
-    whole step), `point_start` [N + 1], `point` [P, 3] (m), `separation` [P] (m), `point_impulse` [P] (N s). Impulses are zero
-    unless the batch listens to "impulses".
+    `world_start` [w + 1], `bodies` [N, 2], `normal` [N, 3] from the first body to the second, `impulse` [N, 3] on the
+    second body over the whole step (N s), `point_start` [N + 1], `point` [P, 3] (m), `separation` [P] (m),
+    `point_impulse` [P] (N s). Impulses are zero unless the batch listens to "impulses".
     """
 
     world_start: NDArray[np.uint32]
@@ -170,7 +171,7 @@ class Contacts:
     point_impulse: Floats
 
     def of(self, k: int) -> Contacts:
-        """Those of the k-th world that was asked for.
+        """The contacts of the k-th requested world.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -197,7 +198,9 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Hits:
-    """What rays hit first: `body` [w, R] (-1 for nothing), `distance` [w, R] (m; inf), `normal` [w, R, 3] (NaN)."""
+    """First hits of rays: `body` [w, R] (-1 without a hit), `distance` [w, R] (m; infinite without a hit), and
+    `normal` [w, R, 3] (NaN without a hit).
+    """
 
     body: NDArray[np.int64]
     distance: Floats
@@ -205,21 +208,23 @@ class Hits:
 
 
 class Batch:
-    """W worlds of up to B bodies, J joints and U actuators, each by itself.
+    """W independent worlds with up to B bodies, J joints and U actuators.
 
-    `scene` and `config` are one for all or one a world; `num_threads` 0 takes all processors. `listen` names what steps tell:
-    "contacts" and "hits" for `events`, "impulses" for `contacts`.
+    `scene` and `config` are one value for all worlds, or one for each world. `num_threads` 0 uses all processors.
+    `listen` selects the data that steps report: "contacts" and "hits" for `events`, "impulses" for `contacts`.
 
-    The bits of a world depend on its scene, settings and inputs alone: not on W, its neighbors, the order of calls to others, threads or
-    machine. Worlds that a call does not name are not touched. After a fork a batch raises RuntimeError: its threads are gone.
+    The bits of a world depend only on its scene, settings and inputs. They do not depend on W, the other worlds, the
+    order of calls to others, threads or the machine. A call does not change worlds that it does not name. After a fork
+    a batch raises RuntimeError, because its threads are gone.
 
-    `position` [W, B, 3], `rotation` [W, B, 4] (x y z w), `linear_velocity` and `angular_velocity` [W, B, 3] are views of what the last call left:
-    read-only, valid as long as anyone holds them; copy them to keep them. Rows that a world has no body for are NaN.
+    `position` [W, B, 3], `rotation` [W, B, 4] (x y z w), `linear_velocity` and `angular_velocity` [W, B, 3] are
+    read-only views of arrays that each call updates. Copy an array to keep its values. Rows of bodies that a world does
+    not have are NaN.
 
-    `force` and `torque` [W, B, 3], `ctrl` [W, U] and `gravity` [W, 3] are inputs: write to them. Each call that steps reads them when it begins; they
-    last until they change. A reset sets them as the scene has them.
+    `force` and `torque` [W, B, 3], `ctrl` [W, U] and `gravity` [W, 3] are inputs: write to them. Each call that steps
+    reads them at its start, and they last until they change. A reset sets them to the values of the scene.
 
-    ValueError: an argument that cannot be used.
+    ValueError: an argument is invalid.
 
     >>> import drystone as ds
     >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 4, config=ds.Config("fast"), num_threads=1)
@@ -249,7 +254,7 @@ class Batch:
             counts.add(_check.whole("num_worlds", num_worlds, 1))
         if len(counts) > 1:
             given = f"{len(scenes)} scenes, {len(configs)} configs and num_worlds = {num_worlds}"
-            raise ValueError(f"{given}: must be one, or as many as worlds")
+            raise ValueError(f"{given}: must be one, or one for each world")
         count = counts.pop() if counts else 1
         is_one = len(scenes) == len(configs) == 1
         threads = _check.whole("num_threads", num_threads)
@@ -268,9 +273,10 @@ class Batch:
         listen: Collection[str] | None = None,
         hits_above: float = 0.5,
     ) -> Self:
-        """A world for each state of `save` or `snapshot`: a reset goes back to that state.
+        """Load one world for each state of `save` or `snapshot`. A reset goes back to that state.
 
-        ValueError: no state; bytes that are none of a world, of another version, damaged or cut short.
+        ValueError: there is no state, or the bytes are not a saved world, have another version, or are damaged or cut
+        short.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
@@ -314,12 +320,12 @@ class Batch:
         return (self._worlds, rows) if width == 1 else (self._worlds, rows, width)
 
     def _take(self, worlds: NDArray[np.int64], inputs: bool = False) -> None:
-        """Take over what worlds have."""
+        """Read the state of some worlds into the arrays."""
         self._batch.read(worlds, self._outputs + (self._inputs if inputs else []))
         self._batch.clocks(*self._clocks)
 
     def _alone(self, work: Callable[[], Result]) -> Result:
-        """Do something that no other thread does at the same time."""
+        """Call `work` while no other thread uses the batch."""
         if os.getpid() != self._process:
             raise RuntimeError("this batch was made before a fork, and its threads are gone: make it in the child, or start it by spawn")
         with self._lock:
@@ -327,62 +333,62 @@ class Batch:
 
     @property
     def num_worlds(self) -> int:
-        """W."""
+        """Number of worlds, W."""
         return self._worlds
 
     @property
     def num_bodies(self) -> int:
-        """B, the most that a world has."""
+        """Largest number of bodies of a world, B."""
         return self._bodies
 
     @property
     def num_joints(self) -> int:
-        """J, the most that a world has."""
+        """Largest number of joints of a world, J."""
         return self._joints
 
     @property
     def num_actuators(self) -> int:
-        """U, the most driven axes that a world has."""
+        """Largest number of driven axes of a world, U."""
         return self._drives
 
     @property
     def num_threads(self) -> int:
-        """Threads that step worlds."""
+        """Number of threads that step worlds."""
         return self._batch.threads
 
     @property
     def position(self) -> Floats:
-        """[W, B, 3] m."""
+        """[W, B, 3] position (m)."""
         return self._views["position"]
 
     @property
     def rotation(self) -> Floats:
-        """[W, B, 4] x y z w."""
+        """[W, B, 4] rotation, x y z w."""
         return self._views["rotation"]
 
     @property
     def linear_velocity(self) -> Floats:
-        """[W, B, 3] m/s, of centers of mass."""
+        """[W, B, 3] velocity of the center of mass (m/s)."""
         return self._views["linear_velocity"]
 
     @property
     def angular_velocity(self) -> Floats:
-        """[W, B, 3] rad/s."""
+        """[W, B, 3] angular velocity (rad/s)."""
         return self._views["angular_velocity"]
 
     @property
     def steps(self) -> NDArray[np.uint64]:
-        """[W] steps since the start."""
+        """[W] number of steps since the start."""
         return self._clock_views[0]
 
     @property
     def time(self) -> Doubles:
-        """[W] s since the start."""
+        """[W] time since the start (s)."""
         return self._clock_views[1]
 
     @property
     def force(self) -> Floats:
-        """[W, B, 3] N through centers of mass; an input."""
+        """[W, B, 3] force through the center of mass (N); an input."""
         return self._arrays["force"]
 
     @force.setter
@@ -391,7 +397,7 @@ class Batch:
 
     @property
     def torque(self) -> Floats:
-        """[W, B, 3] N m; an input."""
+        """[W, B, 3] torque (N m); an input."""
         return self._arrays["torque"]
 
     @torque.setter
@@ -400,7 +406,7 @@ class Batch:
 
     @property
     def ctrl(self) -> Floats:
-        """[W, U] speed of each motor (m/s, rad/s), target of each spring (m, rad); an input."""
+        """[W, U] speed of each motor (m/s, rad/s) and target of each spring (m, rad); an input."""
         return self._arrays["ctrl"]
 
     @ctrl.setter
@@ -409,7 +415,7 @@ class Batch:
 
     @property
     def gravity(self) -> Floats:
-        """[W, 3] m/s²; an input."""
+        """[W, 3] gravity (m/s²); an input."""
         return self._arrays["gravity"]
 
     @gravity.setter
@@ -432,7 +438,7 @@ class Batch:
 
     @property
     def substeps(self) -> NDArray[np.uint32]:
-        """[W, B] substeps that a body takes in a step, 0 where there is none; a new array."""
+        """[W, B] substeps that a body takes in a step, 0 without a body; a new array."""
         return self._body_flags()[2]
 
     def _body_flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.uint32]]:
@@ -443,17 +449,17 @@ class Batch:
 
     @property
     def friction(self) -> Floats:
-        """[W, B] coefficients; a new array. `set_material` changes them."""
+        """[W, B] friction coefficient; a new array. `set_material` changes it."""
         return self._column("friction")
 
     @property
     def restitution(self) -> Floats:
-        """[W, B] coefficients; a new array. `set_material` changes them."""
+        """[W, B] restitution coefficient; a new array. `set_material` changes it."""
         return self._column("restitution")
 
     @property
     def mass_scale(self) -> Floats:
-        """[W, B] mass and moments of inertia over those at the start; a new array. `set_material` changes them."""
+        """[W, B] factor on the initial mass and moments of inertia; a new array. `set_material` changes it."""
         return self._column("mass_scale")
 
     @property
@@ -463,13 +469,14 @@ class Batch:
 
     @property
     def joint_speed(self) -> Floats:
-        """[W, J, 6] their speeds (m/s, rad/s); a new array."""
+        """[W, J, 6] rates of these lengths and angles (m/s, rad/s); a new array."""
         return self._column("joint_speed")
 
     @property
     def joint_force(self) -> Floats:
-        """[W, J, 3] force on the second body in the last step (N): the mean over the step if any joint of the world has
-        a break force, a motor or a spring, else the force of the last substep; a new array."""
+        """[W, J, 3] force on the second body in the last step (N); a new array. It is the mean over the step if any
+        joint of the world has a break force, a motor or a spring, else the force of the last substep.
+        """
         return self._column("joint_force")
 
     @property
@@ -493,9 +500,11 @@ class Batch:
         return array
 
     def step(self, n: int = 1, *, worlds: ArrayLike | None = None, dt: float | None = None) -> None:
-        """Move worlds by n steps of `dt` seconds (that of the scene if None). `worlds`: a mask [W], or numbers ascending; None for all.
+        """Advance worlds by n steps of `dt` seconds; None is the step length of the scene. `worlds` is a mask [W] or
+        ascending indices; None selects all.
 
-        WorldError: some worlds failed, after all others are through. KeyboardInterrupt ends the call with every world between two steps.
+        WorldError: some worlds failed; all others completed the call. KeyboardInterrupt ends the call with every world
+        between two steps.
 
         >>> import drystone as ds, numpy as np
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 3)
@@ -515,10 +524,10 @@ class Batch:
         worlds: ArrayLike | None = None,
         dt: float | None = None,
     ) -> dict[str, NDArray[Any]]:
-        """Move w worlds by n steps in one call, and record every so many steps: arrays [w, n // every, ...].
+        """Advance w worlds by n steps in one call, and record every `every`-th step: arrays [w, n // every, ...].
 
-        `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...), measures
-        (`measure`) and "hash". WorldError has what was recorded.
+        `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...),
+        measures (`measure`) and "hash". A WorldError has the records so far.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
@@ -581,7 +590,7 @@ class Batch:
         try:
             failed = self._batch.run(n, every, chosen, dt, self._inputs, self._outputs, ctrl, list(records.items()))
         finally:
-            # Worlds that did not come to the end tell where they are.
+            # Read the state of worlds that did not complete the call.
             late = chosen if failed is None else np.array([world for world, _ in failed], np.int64)
             if len(late):
                 self._batch.read(late, self._outputs)
@@ -598,7 +607,8 @@ class Batch:
         at: ArrayLike | None = None,
         worlds: ArrayLike | None = None,
     ) -> None:
-        """Push at once: `impulse` [w, b, 3] (N s) on some bodies of some worlds, through centers of mass or `at` points [w, b, 3] (m).
+        """Apply impulses [w, b, 3] (N s) at once to some bodies of some worlds, through centers of mass or at points
+        `at` [w, b, 3] (m).
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -629,7 +639,7 @@ class Batch:
     ) -> None:
         """Set poses and velocities [w, b, 3 or 4] of some bodies of some worlds.
 
-        Contacts keep their impulses where they still touch: to begin anew use `reset` or `restore`.
+        Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -654,10 +664,10 @@ class Batch:
         restitution: ArrayLike | None = None,
         mass_scale: ArrayLike | None = None,
     ) -> None:
-        """Set coefficients [w, b] of some bodies of some worlds, and the mass with the moments of inertia over those at the start. A reset sets them
-        as the scene has them. What has no mass keeps none.
+        """Set coefficients [w, b] of some bodies of some worlds, and the factor on their initial mass and moments of
+        inertia. A reset sets the values of the scene. Bodies without mass stay without mass.
 
-        ValueError: wrong shapes, or a mass that is not 1e-15 to 1e15 kg.
+        ValueError: a shape is wrong, or a mass is not 1e-15 to 1e15 kg.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -686,7 +696,7 @@ class Batch:
         self._alone(lambda: self._take(chosen))
 
     def reset(self, worlds: ArrayLike | None = None) -> None:
-        """Let worlds begin again: they have the bits of worlds that never ran.
+        """Reset worlds to their start. They have the bits of worlds that never ran.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("pile", n=8), 2)
@@ -720,9 +730,9 @@ class Batch:
     def restore(
         self, snapshots: Snapshots, worlds: ArrayLike | None = None, *, source: ArrayLike | None = None
     ) -> None:
-        """Let worlds go on from states: one for each of them, one for all, or that which `source` [w] says for each.
+        """Continue worlds from states: one state for each world, one for all, or the indices of states in `source` [w].
 
-        ValueError: not so many states; a state with more bodies than the batch has rows.
+        ValueError: the number of states is wrong, or a state has more bodies, joints or drives than the batch has rows.
         """
         if not isinstance(snapshots, Snapshots):
             raise ValueError(f"snapshots is {type(snapshots).__name__}: must be Snapshots; Snapshots.from_bytes makes them of bytes")
@@ -754,7 +764,7 @@ class Batch:
         return [0] * worlds if len(snapshots) == 1 else list(range(worlds))
 
     def save(self, worlds: ArrayLike | None = None) -> list[bytes]:
-        """The states of worlds as bytes, the same on every machine: about 6 kB for a tower of ten boxes.
+        """The states of worlds as bytes, the same on every machine. A tower of ten boxes takes about 6 kB.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
@@ -765,7 +775,7 @@ class Batch:
         return self._alone(lambda: self._batch.save(chosen))
 
     def hash(self, worlds: ArrayLike | None = None) -> NDArray[np.uint64]:
-        """[w] hash of poses and velocities: that which `drystone run` prints for the world alone.
+        """[w] hash of poses and velocities. `drystone run` prints the same hash for the world alone.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
@@ -776,13 +786,15 @@ class Batch:
         return self._alone(lambda: self._batch.hash(chosen))
 
     def measure(self, *names: str, worlds: ArrayLike | None = None) -> dict[str, Doubles]:
-        """Measures of worlds, each [w]; all of them without names.
+        """Measures of worlds, each [w]. Without names it returns all measures.
 
-        overlap_max, overlap_mean and overlap_95 (m, of contacts computed anew), joint_gap (m), kinetic_energy and potential_energy (J), momentum_x,
-        y, z (N s), angular_momentum_x, y, z about the origin (N m s), fastest (m/s), need (of the hardest contact), energy_taken in the last step
-        (J), contacts, asleep, finite. residual_velocity (without unit), residual_cone (N s), residual_complementarity and residual_dissipation (J):
-        how far the first substep of the next step leaves impulses from solving its contacts. That step is made on a copy of the world, and costs
-        as much as one. They are NaN of a world with joints.
+        overlap_max, overlap_mean and overlap_95 (m, from recomputed contacts), joint_gap (m), kinetic_energy and
+        potential_energy (J), momentum_x, y, z (N s), angular_momentum_x, y, z about the origin (N m s), fastest (m/s),
+        need (of the hardest contact), energy_taken in the last step (J), contacts, asleep, finite.
+
+        residual_velocity (no unit), residual_cone (N s), residual_complementarity and residual_dissipation (J) are
+        errors of the impulses after the first substep of the next step. That step runs on a copy of the world and costs
+        as much as a normal step. These residuals are NaN for a world with joints.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
@@ -796,7 +808,7 @@ class Batch:
         return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(wanted)}
 
     def contacts(self, worlds: ArrayLike | None = None) -> Contacts:
-        """The contacts of the last step, near ones included: see `Contacts`.
+        """The contacts of the last step, including near ones: see `Contacts`.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2, listen=["impulses"])
@@ -809,8 +821,9 @@ class Batch:
         return Contacts(*self._alone(lambda: self._batch.contacts(chosen)))
 
     def events(self, worlds: ArrayLike | None = None) -> NDArray[np.void]:
-        """What happened in the last step: world, kind (began, ended, hit, entered, left, passed, broke), bodies a and b (-1 for none), and a value:
-        speed of a hit (m/s), time of a passage (s), force on a joint that broke (N). Needs `listen` for began, ended and hit.
+        """The events of the last step: world, kind (began, ended, hit, entered, left, passed, broke), bodies a and b
+        (-1 for no body), and a value: speed of a hit (m/s), time of a passage (s), or force on a broken joint (N). The
+        kinds began, ended and hit need `listen`.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 1, listen=["contacts"])
@@ -824,7 +837,7 @@ class Batch:
     def ray(
         self, origin: ArrayLike, direction: ArrayLike, max_distance: float = 1e6, *, worlds: ArrayLike | None = None
     ) -> Hits:
-        """What R rays hit first in each of w worlds: `origin` and `direction` are [R, 3], or [w, R, 3] (m).
+        """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m).
 
         >>> import drystone as ds
         >>> hits = ds.Batch(ds.Scene.find("tower", n=2), 2).ray([[0, 9, 0]], [[0, -1, 0]])
@@ -844,11 +857,13 @@ class Batch:
     def picture(
         self, world: int = 0, width: int = 640, height: int = 480, *, yaw: float = 30, pitch: float = 25
     ) -> NDArray[np.uint8]:
-        """A picture of a world as it is: [height, width, 3], red, green and blue, rows from the top. `yaw` is the angle of the camera around the
-        world, `pitch` its elevation above the horizon (degrees, below 89 either way). All that moves is in view. Colors are those of materials.
+        """A picture of the present state of a world: [height, width, 3], red, green and blue, rows from the top. `yaw`
+        is the angle of the camera around the world, and `pitch` its elevation above the horizon (degrees, from -89 to
+        89). All moving bodies are in view. Colors show materials.
 
-        A GPU draws it, or a software driver (Mesa's lavapipe: package mesa-vulkan-drivers). AdapterError: there is neither, or a side is too long
-        for it.
+        Drawing needs a GPU or a software driver (Mesa's lavapipe, package mesa-vulkan-drivers).
+
+        AdapterError: there is no adapter, or a side is too long for it.
 
         >>> import drystone as ds
         >>> try:
@@ -860,7 +875,7 @@ class Batch:
         [chosen] = _check.worlds(_check.whole("world", world), self._worlds, "world")
         size = (_side("width", width), _side("height", height))
         if sys.platform == "linux":
-            # Without a desktop, Mesa prints a line where there is no such folder.
+            # Without a desktop, Mesa prints a warning if this folder is not set.
             os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
         angles = np.radians([_check.number("yaw", yaw), min(89.0, max(-89.0, _check.number("pitch", pitch)))])
         return self._alone(lambda: self._batch.picture(int(chosen), size, *(float(angle) for angle in angles)))

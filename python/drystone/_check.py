@@ -1,4 +1,4 @@
-"""Arguments, refused by one line that names the argument, what was given and what was wanted."""
+"""Checks of arguments. A refusal is one line with the argument, its value and the valid values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def whole(name: str, value: Any, least: int = 0) -> int:
-    """A whole number that is not below `least`."""
+    """A whole number of at least `least`."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -34,7 +34,7 @@ def number(name: str, value: Any) -> float:
 
 
 def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Finite numbers in an array of single precision that is not the caller's; a length of -1 may be any."""
+    """Finite numbers in a new array of single precision. A length of -1 in the shape can be any length."""
     try:
         array = np.asarray(value)
     except ValueError:
@@ -61,7 +61,7 @@ def wanted(shape: tuple[int, ...]) -> str:
 
 
 def worlds(value: Any, count: int, name: str = "worlds") -> NDArray[np.int64]:
-    """Worlds by a mask, by ascending numbers or by one number."""
+    """Worlds from a mask, from ascending indices or from one index."""
     if value is None:
         return np.arange(count)
     array = np.asarray(value)
@@ -93,7 +93,7 @@ def one_of(name: str, value: str, known: Iterable[str]) -> str:
 
 
 def hint(word: str, known: Iterable[str]) -> str:
-    """What may have been meant."""
+    """A suggestion for a misspelled word."""
     known = list(known)
     near = difflib.get_close_matches(word, known, 1)
     return f"did you mean {near[0]!r}?" if near else f"must be one of {', '.join(known)}"

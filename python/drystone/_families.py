@@ -1,4 +1,4 @@
-"""Families of hard cases over a grid of settings: which setting stands what, at what price."""
+"""Families of hard cases over a grid of settings: the passing share and the price of each setting."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ Settings = Mapping[str, Any]
 
 # Columns of the page of families (docs/families.md).
 PRESETS: tuple[Settings, ...] = ({"preset": "fast"}, {"preset": "balanced"}, {"preset": "accurate"})
-# Up to here a double has all whole numbers.
+# A double represents every whole number up to here.
 LAST_SEED = 2**53
-# A clock gives these columns, so two runs of one world differ in them.
+# Columns that a clock gives. They differ between two runs of one world.
 TIMED = ("seconds",)
 
-# Lower ends of the cells of a map.
+# Lower limits of the cells of a map.
 RATIOS = (1, 3, 10, 30, 100, 300, 1000)
 STOREYS = (1, 2, 4, 8, 16, 32, 64)
 CELL, GAP, LEFT, TOP, LEGEND = 44, 36, 80, 56, 150
-# A color for each family, far apart to the eye.
+# A distinct color for each family.
 COLORS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf", "#bcbd22", "#7f7f7f")
 
 
 def judged(run: Settings) -> dict[str, Any]:
-    """Run the world of a family and a seed, and hold it against its law: the run of `drystone.survey.families`.
+    """Run the world of a family and a seed, and check it against its law. `drystone.survey.families` runs this
+    function.
 
-    `run` has `family`, `seed` and `settings`. Bodies do not sleep. For the result see `Stability`.
+    `run` has `family`, `seed` and `settings`. Bodies do not sleep. `Stability` describes the result.
 
     >>> from drystone._families import judged
     >>> result = judged({"family": "slopes", "seed": 1, "settings": {"preset": "fast"}})
     >>> result["passed"], result["bodies"], [check["what"] for check in result["checks"]][-1]
-    (True, 1, 'bodies at NaN or infinity')
+    (True, 1, 'non-finite bodies')
     """
     config = _config(run["settings"])
     return _drystone.judge(str(run["family"]), int(run["seed"]), config._config)
@@ -62,13 +63,14 @@ def families(
     on_error: str = "row",
     progress: bool | None = None,
 ) -> Stability:
-    """Judge random worlds of each family (docs/families.md) under each of some settings, as `drystone hard --families` does.
+    """Judge random worlds of each family (docs/families.md) under several settings, like `drystone hard --families`.
 
-    `settings` is a grid, {"preset": ["fast", "accurate"], "max_substeps": [8, 64]} with every pair of both, or a list of dicts of settings
-    (docs/settings.md). `family`: one name or several; None for all. `seeds`: so many from 1 on, or the seeds themselves. `out` and all that
-    follows: as `drystone.survey`; the rows are the same whatever the engine, but for `seconds`, which a clock gives.
+    `settings` is a grid, such as {"preset": ["fast", "accurate"], "max_substeps": [8, 64]} for every pair of both, or a
+    list of dicts of settings (docs/settings.md). `family` is one name or several; None selects all. `seeds` is a number
+    of seeds from 1 on, or the seeds themselves. `out` and the arguments after it are those of `drystone.survey`. The
+    rows are the same for every engine, except `seconds`, which a clock gives.
 
-    ValueError: an unknown family or setting, or a bad seed. RuntimeError: a run ended its worker three times.
+    ValueError: a family or setting is unknown, or a seed is invalid. RuntimeError: a run ended its worker three times.
 
     >>> import drystone as ds
     >>> found = ds.survey.families({"preset": ["fast"], "substeps": [1, 8]}, family="slopes", seeds=3, engine="here")
@@ -101,12 +103,12 @@ def families(
 
 
 def _config(settings: Settings) -> Config:
-    # Sleep would hide what a law is about.
+    # Sleep would hide the behavior that a law describes.
     return Config(**{"sleep": False, **settings})
 
 
 def _grid(settings: Mapping[str, Any] | Sequence[Settings]) -> list[dict[str, Any]]:
-    """All settings of a grid or a list, checked."""
+    """All settings of a grid or of a list, checked."""
     if isinstance(settings, Mapping):
         axes = [[(name, one) for one in _values(name, values)] for name, values in settings.items()]
         chosen = [dict(one) for one in itertools.product(*axes)]
@@ -128,7 +130,7 @@ def _grid(settings: Mapping[str, Any] | Sequence[Settings]) -> list[dict[str, An
 
 
 def _values(name: str, values: Any) -> list[Any]:
-    """The values of a setting in a grid: several, or one."""
+    """The values of a setting in a grid, also if there is only one."""
     if isinstance(values, (str, Mapping)) or not isinstance(values, Iterable):
         return [values]
     several = list(values)
@@ -147,24 +149,25 @@ def _seeds(seeds: int | Iterable[int]) -> list[int]:
     if max(numbers) > LAST_SEED:
         raise ValueError(f"seeds has {max(numbers)}: must be at most 2^53")
     if len(set(numbers)) < len(numbers):
-        raise ValueError("seeds: one is there twice")
+        raise ValueError("seeds: a seed occurs twice")
     return numbers
 
 
 def _label(settings: Settings) -> str:
-    """Settings in a few words."""
+    """A short label for settings."""
     words = [f"{name}={value}" for name, value in settings.items() if name != "preset"]
     return ", ".join([str(settings.get("preset", "balanced")), *words])
 
 
 @dataclass(frozen=True)
 class Stability:
-    """Which settings stand which worlds of which families, at what price: the result of `drystone.survey.families`.
+    """The result of `drystone.survey.families`: the worlds that pass under each setting, and their price.
 
-    `rows` has one of each world under each of the settings: `family`, `seed`, `settings`; `bodies` that move, their `height` (m), the same in bodies
-    (`storeys`), `mass_ratio` of the heaviest to the lightest, `gravity` (m/s²), `dt` (s), `steps`; `passed`, and `checks` with `what`, `value`,
-    `limit` (the most that is allowed) and `passed`; `overlap_max` (m, looked at twenty times), `price` (substeps of all bodies that move
-    in all steps), `seconds` (of the processor for a second of the world) and `hash`. A run that raised has `error` instead, and does not pass.
+    `rows` has one row for each world and setting, with `family`, `seed` and `settings`; `bodies` (number of dynamic
+    bodies), `height` (m), `storeys` (height in bodies), `mass_ratio` (heaviest to lightest body), `gravity` (m/s²),
+    `dt` (s) and `steps`; `passed`, and `checks` with `what`, `value`, `limit` and `passed`; `overlap_max` (m, measured
+    twenty times), `price` (substeps summed over dynamic bodies and steps), `seconds` (of processor time per simulated
+    second) and `hash`. A run that raised an exception has `error` instead, and does not pass.
 
     >>> import drystone as ds
     >>> found = ds.survey.families([{"preset": "fast"}], family="pushed-blocks", seeds=2, engine="here")
@@ -176,19 +179,20 @@ class Stability:
 
     @property
     def settings(self) -> tuple[Settings, ...]:
-        """The settings, in their order."""
+        """The settings in order."""
         return tuple({_label(row["settings"]): row["settings"] for row in self.rows}.values())
 
     @property
     def families(self) -> tuple[str, ...]:
-        """The families, in their order."""
+        """The families in order."""
         return tuple(dict.fromkeys(row["family"] for row in self.rows))
 
     def shares(self, *, together: bool = False) -> list[Row]:
-        """The worlds of each family under each of the settings; of all families `together`.
+        """The passing share of each family under each setting, or with `together` of all families in total.
 
-        A row has `family`, `settings`, `worlds`, `passed`, `share`, its 95 % interval by the formula of Wilson (`least`, `most`), and medians over
-        the worlds: `seconds` (of the processor for a second of the world), `overlap_max` (m), `substeps` (of a body in a step).
+        A row has `family`, `settings`, `worlds`, `passed`, `share`, its 95 % interval by Wilson's formula (`least`,
+        `most`), and medians over the worlds: `seconds` (of processor time per simulated second), `overlap_max` (m),
+        `substeps` (per body and step).
 
         >>> import drystone as ds
         >>> [one] = ds.survey.families([{"preset": "fast"}], family="slopes", seeds=2, engine="here").shares()
@@ -225,7 +229,7 @@ class Stability:
         }
 
     def table(self) -> str:
-        """The shares as a table in Markdown: share, interval, and milliseconds of the processor for a second of the world.
+        """The shares as a Markdown table: share, interval, and milliseconds of processor time per simulated second.
 
         >>> import drystone as ds
         >>> found = ds.survey.families([{"preset": "fast"}], family="slopes", seeds=2, engine="here")
@@ -240,10 +244,10 @@ class Stability:
         return "\n".join(lines)
 
     def price_svg(self) -> str:
-        """The share that passes against the time of the processor, as SVG: a line of each family through its settings, and one of all together with
-        the 95 % intervals.
+        """The passing share against processor time, as SVG: one line for each family through its settings, and one for
+        all families in total with 95 % intervals.
 
-        ValueError: no world ran to its end.
+        ValueError: no world completed its run.
 
         >>> import drystone as ds
         >>> found = ds.survey.families([{"preset": "fast"}], family="slopes", seeds=2, engine="here")
@@ -257,7 +261,7 @@ class Stability:
         width, height, bottom = 760, 420, 376
         powers = [math.log10(one["seconds"]) for one in known + both]
         low, high = math.floor(min(powers) - 0.05), math.ceil(max(powers) + 0.05)
-        # The axis of shares begins at a quarter.
+        # The axis of shares starts at a multiple of a quarter.
         ends = [float(one["share"]) for one in known] + [float(one["least"]) for one in both]
         first = math.floor(4 * min(0.75, *ends)) / 4
 
@@ -287,7 +291,7 @@ class Stability:
             x, _ = place(one, one["share"])
             low_y, high_y = up(one["least"]), up(one["most"])
             parts.append(f'<path d="M{x:.1f} {low_y:.1f}V{high_y:.1f}" stroke="#000" stroke-width="1.5"/>')
-            # Labels of settings that cost nearly the same stand below each other.
+            # Stagger the labels, because settings can have nearly the same price.
             parts.append(text(round(x, 1), round(low_y + 16 + 14 * (k % 3), 1), _label(one["settings"])))
         end = TOP + 18 * len(self.families)
         parts.append(f'<rect x="{right + 16}" y="{end - 9}" width="10" height="10" fill="#000"/>')
@@ -295,9 +299,12 @@ class Stability:
         return _svg(width, height, parts)
 
     def map_svg(self, family: str | Collection[str] | None = None) -> str:
-        """The share that passes over height and mass ratio, as SVG: a map of each of the settings; a cell has the share in percent and the worlds.
+        """The passing share over height and mass ratio, as SVG: one map for each setting. A cell has the share in
+        percent and the number of worlds.
 
-        `family` names families to take; None takes all. ValueError: no world of these ran to its end.
+        `family` selects families; None selects all.
+
+        ValueError: no world of these families completed its run.
 
         >>> import drystone as ds
         >>> found = ds.survey.families([{"preset": "fast"}], family="slopes", seeds=2, engine="here")
@@ -332,7 +339,9 @@ class Stability:
         return _svg(max(width, 400), bottom + 70, parts)
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write the table (families.md) and both pictures (families-price.svg, families-map.svg) into a folder; their paths."""
+        """Write the table (families.md) and both pictures (families-price.svg, families-map.svg) into a folder, and
+        return their paths.
+        """
         files = {"families.md": self.table() + "\n", "families-price.svg": self.price_svg(), "families-map.svg": self.map_svg()}
         made = Path(folder)
         made.mkdir(parents=True, exist_ok=True)
@@ -342,7 +351,7 @@ class Stability:
 
 
 class _Surveys:
-    """`drystone.survey`, and what it can do with families."""
+    """`drystone.survey`, with `families` as an attribute."""
 
     __call__ = staticmethod(survey)
     families = staticmethod(families)
@@ -360,7 +369,7 @@ def _words(one: Row | None) -> str:
 
 
 def _cell(value: float, ends: Sequence[int]) -> int:
-    """The cell that a value belongs to; one that is below an end by rounding alone is not below it."""
+    """The index of the cell for a value. A value that is below a limit only by rounding counts as above."""
     return max(0, sum(value * (1 + 1e-6) >= end for end in ends) - 1)
 
 

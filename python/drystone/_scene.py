@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a scene: its default, least and greatest value, and whether it is a whole number."""
+    """A parameter of a scene: its default, its smallest and largest value, and whether it is a whole number."""
 
     name: str
     default: float
@@ -47,7 +47,7 @@ def scenes() -> tuple[SceneInfo, ...]:
 
 
 class Scene:
-    """Bodies and joints as they begin, and the length of a step. A scene does not change.
+    """Initial bodies and joints, and the length of a step. A scene is immutable.
 
     >>> import drystone as ds
     >>> scene = ds.Scene.find("tower", n=3, top_ratio=100)
@@ -63,9 +63,9 @@ class Scene:
 
     @classmethod
     def find(cls, name: str, **parameters: float) -> Scene:
-        """A scene of the catalogue (`scenes()`) with its parameters.
+        """Find a scene of the catalogue (`scenes()`) with its parameters.
 
-        ValueError: no scene or parameter of that name, or a value out of range.
+        ValueError: there is no scene or parameter of that name, or a value is out of range.
 
         >>> import drystone as ds
         >>> ds.Scene.find("towr")
@@ -79,7 +79,7 @@ class Scene:
     def load(cls, path: str | os.PathLike[str]) -> Scene:
         """Read a scene file (JSON, docs/scene-files.md).
 
-        OSError: the file cannot be read. ValueError: it says what no scene can be made of.
+        OSError: the file cannot be read. ValueError: no scene can be built from it; the message has the reason.
 
         >>> import drystone as ds, tempfile, json, pathlib
         >>> with tempfile.TemporaryDirectory() as folder:
@@ -92,9 +92,9 @@ class Scene:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], name: str = "scene") -> Scene:
-        """A scene of what a scene file has.
+        """A scene from the content of a scene file.
 
-        ValueError: a key or a value that no scene has; the line names the body.
+        ValueError: a key or a value is invalid. The line names the body.
 
         >>> import drystone as ds
         >>> ball = {"shapes": [{"type": "ball", "radius": 0.5}]}
@@ -109,9 +109,9 @@ class Scene:
 
     @classmethod
     def from_world(cls, world: World, dt: float = 1 / 60, name: str = "scene") -> Scene:
-        """A scene of a world that was built body by body.
+        """A scene from a world that was built body by body.
 
-        ValueError: as `from_dict`.
+        ValueError: that of `from_dict`.
 
         >>> import drystone as ds
         >>> world = ds.World()
@@ -123,7 +123,7 @@ class Scene:
         return cls.from_dict({**world.to_dict(), "dt": _check.number("dt", dt)}, name)
 
     def to_dict(self) -> dict[str, Any]:
-        """What a scene file of it has, every number to the last bit.
+        """The content of a scene file for this scene, with every number to the last bit.
 
         >>> import drystone as ds
         >>> len(ds.Scene.find("tower", n=2).to_dict()["bodies"])
@@ -172,15 +172,15 @@ def _found(name: str, parameters: dict[str, float]) -> Scene:
 
 
 def _plain(key: str, value: Any) -> str:
-    """A number as the catalogue reads it."""
+    """The text of a number for the catalogue."""
     number = _check.number(key, value)
     return str(int(number)) if number.is_integer() else repr(number)
 
 
 class Config:
-    """Settings of the solver (docs/settings.md). They do not change.
+    """Settings of the solver (docs/settings.md), immutable.
 
-    ValueError: no setting of that name, or a value that it cannot have.
+    ValueError: there is no setting of that name, or a value is invalid.
 
     >>> import drystone as ds
     >>> ds.Config("accurate", sleep=False)["substeps"]
@@ -230,7 +230,7 @@ def _config_of(settings: dict[str, Any]) -> Config:
 
 
 def _json(key: str, value: Any) -> Any:
-    """A value as JSON has it."""
+    """A value for JSON."""
     if isinstance(value, (bool, int, str)):
         return value
     return _check.number(key, value)

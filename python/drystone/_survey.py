@@ -1,4 +1,5 @@
-"""Surveys: one function of many arguments, here, in processes or on a cluster, with the same rows."""
+"""Surveys: one function of many arguments, in this process, in several processes or on a cluster, with the same rows.
+"""
 
 from __future__ import annotations
 
@@ -29,21 +30,24 @@ Run = Callable[[dict[str, Any]], Mapping[str, Any]]
 Row = dict[str, Any]
 ENGINES = ("auto", "here", "processes", "ray")
 
-# A task of a survey takes about so many seconds: of a shorter one the overhead counts, and of a longer one more is lost with a worker.
+# Target duration of a task: a shorter one has more overhead, and a longer one loses more work with its worker.
 TASK_SECONDS = 1.0
 MOST_RUNS_A_TASK = 4096
-# And so much longer for each task that runs at the same time, because the driver takes 2 ms a task (docs/cluster.md).
+# Additional duration for each task that runs at the same time, because the driver takes 2 ms for a task
+# (docs/cluster.md).
 SECONDS_A_TASK = 0.005
-# Tasks for each worker at the same time: one that runs and one that waits.
+# Simultaneous tasks of each worker: one that runs and one that waits.
 TASKS_A_WORKER = 2
-# How often a run may end its worker.
+# Number of times that a run may end its worker.
 MOST_DEATHS = 3
-# How often a check looks for a worker that did not do the run before.
+# Number of attempts of a check to find a worker other than that of the first run.
 MOST_SEARCHES = 5
 
 
 class NotTheSame(RuntimeError):
-    """A run that was computed twice gave two results: `run` has its argument, `results` both, `machines` who computed them."""
+    """Two computations of one run gave different results. `run` has its argument, `results` both results, and
+    `machines` where they were computed.
+    """
 
     def __init__(self, run: Any, results: tuple[Any, Any], machines: tuple[str, str]) -> None:
         self.run, self.results, self.machines = run, results, machines
@@ -52,9 +56,10 @@ class NotTheSame(RuntimeError):
 
 @dataclass(frozen=True)
 class Rows(Sequence[Row]):
-    """The rows of a survey in the order of its runs. A row has `key`, what was asked and what came of it, or `error`.
+    """The rows of a survey in the order of its runs. A row has `key`, the argument, and the result or `error`.
 
-    `who` says for each row which machine and process computed it and how many seconds it took; rows of a file from before have none.
+    `who` has the machine and process that computed each row, and the time (s). It is empty for rows from an earlier
+    file.
     """
 
     rows: tuple[Row, ...]
@@ -71,7 +76,7 @@ class Rows(Sequence[Row]):
         return len(self.rows)
 
     def columns(self) -> dict[str, np.ndarray[Any, Any]]:
-        """An array for each name that any row has; None where a row has no value.
+        """An array for each name of any row, with None for rows without a value.
 
         >>> import drystone as ds
         >>> ds.Rows(({"key": "a", "n": 1}, {"key": "b", "n": 2})).columns()["n"].tolist()
@@ -94,17 +99,25 @@ def survey(
     on_error: str = "row",
     progress: bool | None = None,
 ) -> Rows:
-    """Compute `run` of every argument of `runs`; the rows have the order of `runs` and the same bits whatever the engine.
+    """Compute `run` for every argument in `runs`. The rows are in the order of `runs`, and have the same bits for every
+    engine.
 
-    `run` is a function of a module whose result (numbers, strings, small arrays) depends on its argument alone.
-    `out` is a file of JSON lines, one when a row is there, put in order at the end; the same call again takes its rows over,
-    and drops a line that was cut off. `engine`: "here" is this process, "processes" a pool, "ray" a cluster (drystone[ray]); "auto" is "ray"
-    where Ray is initialized, and else "processes". `chunk`: runs a task; None aims at a second a task. `twice`: the share of runs that is
-    computed again by another worker; where results differ, NotTheSame names the run and both machines. `timed` names results that a clock
-    gives, which may differ. `on_error`: "row" makes a row
-    with `error` of an exception, "raise" raises it. Ctrl-C keeps the rows that are there.
+    `run` is a function of a module. Its result (numbers, strings, small arrays) depends only on its argument.
 
-    ValueError: an argument that cannot be used. RuntimeError: a run ended its worker three times.
+    `out` is a file of JSON lines. Each row is added when it is computed, and the rows are sorted at the end. A repeated
+    call reuses the rows of the file, and discards an incomplete line.
+
+    `engine`: "here" is this process, "processes" is a pool of processes, and "ray" is a cluster (drystone[ray]). "auto"
+    is "ray" if Ray is initialized, else "processes". `chunk` is the number of runs in a task; None aims at a second for
+    each task.
+
+    `twice` is the share of runs that another worker computes again. If the results differ, NotTheSame names the run and
+    both machines. `timed` names results that a clock gives, which may differ.
+
+    `on_error`: "row" makes a row with the `error` of an exception, and "raise" raises it. Ctrl-C keeps the completed
+    rows.
+
+    ValueError: an argument is invalid. RuntimeError: a run ended its worker three times.
 
     >>> import drystone as ds
     >>> from drystone.studies import stands
@@ -137,7 +150,9 @@ def _plain_run(k: int, one: Any) -> dict[str, Any]:
 
 
 def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
-    """A key for each run: a hash of its argument, of the function and of the program. Equal runs have equal keys but for their count."""
+    """A key for each run: a hash of its argument, the function and the program. Repeated runs are numbered, so that
+    their keys differ.
+    """
     try:
         source = inspect.getsource(run)
     except (OSError, TypeError):
@@ -157,7 +172,7 @@ def _machine() -> str:
 
 
 def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | None, on_error: str) -> list[Row] | None:
-    """Rows of some runs with who computed them; None where this process is the one that must not."""
+    """Compute some runs. Returns rows with their machines, or None if this process is the excluded one."""
     if not_by == _machine():
         return None
     rows = []
@@ -174,7 +189,7 @@ def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | Non
 
 
 def plain(value: Any) -> Any:
-    """A result as JSON has it, every number to the last bit."""
+    """A result in the form of JSON, with every number to the last bit."""
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
@@ -189,12 +204,12 @@ def plain(value: Any) -> Any:
 
 
 def _same(a: Any, b: Any) -> bool:
-    # NaN is not itself, but its text is.
+    # NaN differs from itself, but its text does not.
     return json.dumps(a, sort_keys=True) == json.dumps(b, sort_keys=True)
 
 
 class _Store:
-    """The rows that are there, and their file."""
+    """The completed rows, and their file."""
 
     def __init__(self, path: Path | None, keys: list[str]) -> None:
         self.path, self.have, self.who = path, dict[str, str](), dict[str, Row]()
@@ -208,7 +223,7 @@ class _Store:
 
     def __enter__(self) -> _Store:
         if self.path is not None:
-            # What was cut off, and rows of other surveys, go before new rows come.
+            # Remove incomplete lines and rows of other surveys before adding rows.
             self._write(list(self.have.values()))
             self.file = self.path.open("a")
         return self
@@ -248,7 +263,7 @@ def _key_of(line: str) -> str | None:
 
 
 class _Progress:
-    """A line on a terminal: rows that are there, and the time that is left."""
+    """A progress line on a terminal: completed rows, and the remaining time."""
 
     def __init__(self, all_rows: int, wanted: bool | None) -> None:
         self.all, self.begin, self.first, self.last = all_rows, time.monotonic(), -1, 0.0
@@ -271,7 +286,7 @@ Task = tuple[list[int], str | None, int]
 
 @dataclass
 class _Survey:
-    """What is still to be done."""
+    """The remaining work of a survey."""
 
     run: Run
     asked: list[dict[str, Any]]
@@ -297,7 +312,7 @@ class _Survey:
                 number, rows = engine.next()
                 numbers, not_by, searches = running.pop(number)
                 if rows is None:
-                    # The worker that computed these before took them again.
+                    # The worker of the first run got this check: try again.
                     other = not_by if searches < MOST_SEARCHES else None
                     checks.append((numbers, other, searches + 1))
                     continue
@@ -315,7 +330,7 @@ class _Survey:
         wanted = max(TASK_SECONDS, SECONDS_A_TASK * room)
         size = self.chunk or min(MOST_RUNS_A_TASK, max(1, round(wanted / mean)) if mean else 1)
         if self.chunk is None:
-            # At the end each worker has something left to do.
+            # Near the end, every worker should still get a task.
             size = max(1, min(size, len(todo) // max(1, room)))
         return [todo.popleft() for _ in range(min(size, len(todo)))], None, 0
 
@@ -336,15 +351,15 @@ class _Survey:
 
 
 class _Engine(Protocol):
-    """Does tasks; a task whose worker dies is done again."""
+    """Runs tasks. A task is repeated if its worker dies."""
 
     @property
     def room(self) -> int:
-        """Tasks at the same time."""
+        """Number of simultaneous tasks."""
 
     @property
     def has_others(self) -> bool:
-        """Whether another worker than that of a task can do it."""
+        """Whether a worker other than that of a task can run it."""
 
     def __enter__(self) -> _Engine: ...
     def __exit__(self, *_: object) -> None: ...
@@ -363,7 +378,7 @@ def _engine(name: str, workers: int | None) -> _Engine:
 
 
 class _Here:
-    """This process."""
+    """Runs tasks in this process."""
 
     room, has_others = 1, False
 
@@ -392,7 +407,7 @@ def _ignore_interrupts() -> None:
 
 @dataclass
 class _Worker:
-    """A process, and its tasks in their order."""
+    """A process, and its tasks in order."""
 
     pool: futures.ProcessPoolExecutor
     tasks: dict[int, futures.Future[list[Row] | None]] = field(default_factory=dict)
@@ -400,7 +415,7 @@ class _Worker:
 
 
 class _Processes:
-    """Processes of this machine, each with a queue of its own: where one dies, the first task of its queue is to blame."""
+    """Processes of this machine, each with its own queue. If a process dies, the first task of its queue is blamed."""
 
     def __init__(self, workers: int) -> None:
         self.room, self.has_others = TASKS_A_WORKER * workers, workers > 1
@@ -451,7 +466,7 @@ class _Processes:
             return number, rows
 
     def _replace(self, worker: _Worker) -> None:
-        """A new process in place of one that died, with its tasks."""
+        """Start a new process in place of a dead one, with the same tasks."""
         tasks = sorted(worker.tasks)
         for first in tasks[:1]:
             self.deaths[first] = self.deaths.get(first, 0) + 1
@@ -463,7 +478,7 @@ class _Processes:
 
 
 class _Ray:
-    """A cluster by Ray, which does tasks of dead workers and nodes again."""
+    """A Ray cluster. Ray repeats the tasks of dead workers and nodes."""
 
     def __init__(self) -> None:
         try:
@@ -472,7 +487,7 @@ class _Ray:
             raise ValueError("engine = 'ray': Ray is not installed; pip install 'drystone[ray]'") from None
         self.running: dict[Any, int] = {}
         self.count = 0
-        # Nodes come and go, and to ask for them takes as long as a task.
+        # Nodes come and go, and a query for them takes as long as a task.
         self.processors, self.asked = 1, -1.0
 
     def __enter__(self) -> _Ray:

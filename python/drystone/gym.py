@@ -1,4 +1,4 @@
-"""Environments for training: batches as `VectorEnv` of Gymnasium (drystone[gym])."""
+"""Environments for training: batches as Gymnasium's `VectorEnv` (drystone[gym])."""
 
 from __future__ import annotations
 
@@ -27,14 +27,16 @@ Start = Callable[[np.random.Generator, Batch, int], None]
 
 
 class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
-    """A batch as environments that run beside each other.
+    """A batch as parallel environments.
 
-    `observe(batch)` gives [W, ...], `reward(batch, actions)` [W], `terminated(batch)` bool [W]; `act(batch, actions)` writes inputs;
-    `start(rng, batch, world)` changes a world after its reset. `memory` has the arrays that these functions keep from step to step,
-    for `state`. An action lasts `frame_skip` steps; an episode is cut after `max_steps` actions.
+    `observe(batch)` returns [W, ...], `reward(batch, actions)` [W], and `terminated(batch)` bool [W]. `act(batch,
+    actions)` writes inputs. `start(rng, batch, world)` changes a world after its reset. `memory` has the arrays that
+    these functions keep from step to step, so that `state` saves them. An action lasts `frame_skip` steps, and an
+    episode is truncated after `max_steps` actions.
 
-    All three autoreset modes. World k has the seed s + k, or that of a list; its n-th episode depends on that seed and n alone,
-    whatever other worlds do. A world that fails is terminated, infos["error"] says why, and the next reset makes it whole.
+    All three autoreset modes are supported. World k has the seed s + k, or the k-th seed of a list. Its n-th episode
+    depends only on that seed and n, not on other worlds. A failed world is terminated, infos["error"] has the reason,
+    and the next reset repairs it.
 
     >>> from drystone.gym import cart_pole
     >>> envs = cart_pole(4)
@@ -81,9 +83,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin new episodes: of all worlds, or of those of `options["reset_mask"]`. A seed begins with episode 0.
+        """Start new episodes in all worlds, or in those of `options["reset_mask"]`. A seed starts with episode 0.
 
-        ValueError: not so many seeds; a mask that is no bool array [W] with a True.
+        ValueError: the number of seeds is wrong, or the mask is not a bool array [W] with a True.
         """
         mask = self._mask(options)
         seeds: Sequence[int | None]
@@ -103,9 +105,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
     def step(
         self, actions: NDArray[Any]
     ) -> tuple[Floats, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Act in all worlds. In the mode NEXT_STEP a world whose episode ended begins a new one instead.
+        """Act in all worlds. In the mode NEXT_STEP, a world whose episode is over starts a new episode instead.
 
-        ValueError: actions of another shape. RuntimeError: in the mode DISABLED, a world whose episode ended was not reset.
+        ValueError: the actions have another shape. RuntimeError: in the mode DISABLED, a world whose episode is over
+        was not reset.
         """
         actions = np.asarray(actions)
         if actions.shape != self.action_space.shape:
@@ -132,15 +135,17 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
         return observations, rewards, terminated, truncated, infos
 
     def state(self) -> bytes:
-        """All of the environments, to go on to the same bits: worlds, inputs, episodes, seeds, memory."""
+        """The state of all environments: worlds, inputs, episodes, seeds and memory. From it they continue with the
+        same bits.
+        """
         inputs = {name: getattr(self.batch, name).copy() for name in ("force", "torque", "ctrl", "gravity")}
         clocks = (list(self._seeds), self._episodes.copy(), self._elapsed.copy(), self._is_over.copy())
         return pickle.dumps((self.batch.save(), inputs, clocks, self._memory))
 
     def set_state(self, state: bytes) -> None:
-        """Go on from a state of `state`, which may be of another process. It is a pickle: load only what you made.
+        """Continue from a state of `state`, also of another process. The state is a pickle: load only trusted states.
 
-        ValueError: it has another number of worlds.
+        ValueError: the state has another number of worlds.
         """
         worlds, inputs, clocks, memory = pickle.loads(state)
         if len(worlds) != self.num_envs:
@@ -202,7 +207,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
 
 
 class Env(gymnasium.Env[Floats, NDArray[Any]]):
-    """One environment by itself, over a `VectorEnv` of one world."""
+    """A single environment, over a `VectorEnv` of one world."""
 
     def __init__(self, make: Callable[..., VectorEnv], **options: Any) -> None:
         self.envs = make(1, autoreset_mode=AutoresetMode.DISABLED, **options)
@@ -212,13 +217,13 @@ class Env(gymnasium.Env[Floats, NDArray[Any]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode."""
+        """Start an episode."""
         super().reset(seed=seed)
         observations, infos = self.envs.reset(seed=seed)
         return observations[0], infos
 
     def step(self, action: NDArray[Any]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Act."""
+        """Make one action."""
         observations, rewards, terminated, truncated, infos = self.envs.step(np.asarray(action)[None])
         return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), infos
 
@@ -242,9 +247,11 @@ def cart_pole(
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
 ) -> VectorEnv:
-    """Push a cart (1 kg, up to 10 N) so that the pole on it (0.1 kg, 1 m) stands: one point a step of 1/50 s.
+    """Push a cart (1 kg, up to 10 N) so that the pole on it (0.1 kg, 1 m) stays upright. The reward is 1 for each step
+    of 1/50 s.
 
-    Observations: place and speed of the cart (m, m/s), angle and angular velocity of the pole (rad, rad/s). An episode ends at 2.4 m or 0.21 rad.
+    Observations: position and speed of the cart (m, m/s), angle and angular velocity of the pole (rad, rad/s). An
+    episode ends beyond 2.4 m or 0.21 rad.
     """
     batch = Batch(_cart_and_pole(), num_envs, config=Config(sleep=False), num_threads=num_threads)
 
@@ -293,10 +300,12 @@ def drawbridge(
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
 ) -> VectorEnv:
-    """Hold a deck with a crate on it at an angle that each episode draws, by the speeds of two winches (m/s, up to 0.5).
+    """Hold a deck with a crate at a target angle, by the speeds of two winches (m/s, up to 0.5). Each episode draws the
+    angle.
 
-    Observations: angle and angular velocity of the deck, the wanted angle (rad, rad/s), place of the crate and its velocity (m, m/s). The reward is
-    minus the distance of both angles. An episode ends when the crate falls off the deck.
+    Observations: angle and angular velocity of the deck (rad, rad/s), target angle (rad), position and velocity of the
+    crate (m, m/s). The reward is minus the distance between angle and target. An episode ends when the crate falls off
+    the deck.
     """
     batch = Batch(Scene.find("drawbridge"), num_envs, config=Config(sleep=False), num_threads=num_threads)
     wanted = np.zeros(num_envs, np.float32)
@@ -328,15 +337,16 @@ def drawbridge(
     )
 
 
-# The board turns by so much in a second at most (degrees), and a ball is at the goal within so many cells of its middle.
+# Largest tilt rate of the board (degrees/s), and largest distance of an arrived ball from the center of the goal
+# (cells).
 TILT_RATE, ARRIVED = 60.0, 0.4
-# Board, goal and lids of the walls turn together; the ball is the body after them.
+# Board, goal and lids of the walls rotate together. The ball is the next body.
 BOARD, BALL = (0, 1, 2), 3
 MAZE_SKIP = 6
 
 
 class _Board:
-    """A board of the maze game: its cells, and how far each is from the goal."""
+    """A board of the maze game: its cells, and the distance of each cell from the goal."""
 
     def __init__(self, name: str) -> None:
         scene, rows, self.cell, self.radius, self.steepest = _drystone.maze(name)
@@ -347,12 +357,12 @@ class _Board:
         self.left = self._left()
 
     def middle(self, place: NDArray[Any]) -> NDArray[Any]:
-        """Middle of a cell, x and z (m)."""
+        """Center of a cell, x and z (m)."""
         middle: NDArray[Any] = (self.cell * (place + 0.5 - 0.5 * self.size))[::-1]
         return middle
 
     def left_at(self, ball: NDArray[Any]) -> NDArray[Any]:
-        """Cells from balls [W, 2] (x and z) to the goal, on a way around walls and holes."""
+        """Number of cells from balls [W, 2] (x and z) to the goal, around walls and holes."""
         places = np.floor(ball[:, ::-1] / self.cell + 0.5 * self.size).astype(int)
         row, column = np.clip(places, 0, self.size - 1).T
         left: NDArray[Any] = self.left[row, column]
@@ -372,7 +382,7 @@ class _Board:
 
 
 def _turn_back(rotation: NDArray[Any], vector: NDArray[Any]) -> NDArray[Any]:
-    """Vectors [W, 3] in the frames of rotations [W, 4]."""
+    """Vectors [W, 3] in the frames with rotations [W, 4]."""
     axis, w = -rotation[:, :3], rotation[:, 3:]
     across = np.cross(axis, vector)
     turned: NDArray[Any] = vector + 2 * (w * across + np.cross(axis, across))
@@ -393,14 +403,18 @@ def maze(
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
 ) -> VectorEnv:
-    """Roll a ball to the goal of a board and into no hole, by tilting the board: `board` is easy, medium, hard or a file (docs/maze.md).
+    """Tilt a board so that a ball rolls to the goal and past the holes. `board` is easy, medium, hard or a file
+    (docs/maze.md).
 
-    Actions: the wanted tilts to the right and to the front, 1 for the steepest; the board turns by 60 degrees a second at most. An action lasts 1/20 s.
-    Observations: place of the ball on the board and its velocity (m, m/s), both tilts (rad), the way to the goal as the crow flies (m). Each
-    episode begins within a centimeter of the middle of the start. An episode ends at the goal (reward 1) or in a hole (-1); an action costs a
-    thousandth of the cells that are left on the way around walls and holes.
+    Actions: the wanted tilts to the right and to the front; 1 is the steepest. The board rotates by at most 60 degrees
+    a second. An action lasts 1/20 s. Observations: position of the ball on the board and its velocity (m, m/s), both
+    tilts (rad), and the straight vector to the goal (m).
 
-    ValueError: no board of that name.
+    Each episode starts within a centimeter of the center of the start along each axis. It ends at the goal (reward 1)
+    or in a hole (reward -1). An action costs a thousandth of the number of cells left to the goal, around walls and
+    holes.
+
+    ValueError: there is no board of that name.
 
     >>> from drystone.gym import maze
     >>> envs = maze(2, board="easy")
@@ -430,13 +444,13 @@ def maze(
         return low
 
     def act(batch: Batch, actions: NDArray[Any]) -> None:
-        # From the poses alone, so that worlds that do not step remember nothing of it.
+        # The tilt comes from the poses alone, so worlds that do not step need no memory of it.
         tilts = _tilts(batch.rotation[:, 0].astype(np.float64))
         wanted = tilts + np.clip(steepest * np.clip(actions, -1, 1) - tilts, -reach, reach)
         right, front = wanted.T / 2
         turn = np.stack([np.sin(front) * np.cos(right), np.sin(front) * np.sin(right), -np.cos(front) * np.sin(right)], axis=1)
         target = np.concatenate([turn, (np.cos(front) * np.cos(right))[:, None]], axis=1)
-        # The turn from now to the target, about an axis of the world.
+        # The rotation from the present pose to the target, about world axes.
         axis, w = -batch.rotation[:, 0, :3].astype(np.float64), batch.rotation[:, 0, 3:].astype(np.float64)
         between = target[:, 3:] * axis + w * target[:, :3] + np.cross(target[:, :3], axis)
         speeds = np.repeat((2 * between / time)[:, None], len(BOARD), axis=1)
@@ -466,7 +480,7 @@ def maze(
 
 
 DECK, WHEEL, TRACK = 4.0, 0.2, 0.4
-# Of the winch and of the wheels (rad/s), and the most torque of each (N m).
+# Largest speed (rad/s) and torque (N m) of the winch, then of the wheels.
 WINCH, DRIVE = (0.4, 1.2e4), (15.0, 60.0)
 
 
@@ -492,11 +506,14 @@ def cart_on_drawbridge(
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
 ) -> VectorEnv:
-    """Lower a drawbridge of 4 m by its winch, and drive a cart of four wheels over it to the far road.
+    """Lower a drawbridge of 4 m by its winch, and drive a cart with four wheels over it to the far road.
 
-    Actions: speed of the winch (1 is 0.4 rad/s up) and of the wheels (1 is 15 rad/s ahead). An action lasts 1/30 s. Observations: place and velocity
-    of the cart along and up (m, m/s), its angle and that of the deck, and how fast both turn (rad, rad/s). Each episode draws how far the deck
-    is up, 0.2 to 1 rad. An episode ends on the far road (reward 10) or below the roads; an action has the reward of the way ahead (m).
+    Actions: speeds of the winch (1 is 0.4 rad/s up) and of the wheels (1 is 15 rad/s ahead). An action lasts 1/30 s.
+    Observations: position and velocity of the cart along the road and up (m, m/s), the angles of cart and deck (rad),
+    and their angular velocities (rad/s).
+
+    Each episode draws the initial angle of the deck, 0.2 to 1 rad. It ends on the far road (reward 10) or below the
+    roads. The reward of an action is the distance driven ahead (m).
 
     >>> from drystone.gym import cart_on_drawbridge
     >>> envs = cart_on_drawbridge(2)
@@ -523,7 +540,7 @@ def cart_on_drawbridge(
     def act(batch: Batch, actions: NDArray[Any]) -> None:
         wanted = np.clip(actions, -1, 1)
         batch.ctrl[:, 0] = WINCH[0] * wanted[:, 0]
-        # A wheel that rolls ahead turns against the axis of its hinge.
+        # A wheel that rolls ahead rotates against the axis of its hinge.
         batch.ctrl[:, 1:] = -DRIVE[0] * wanted[:, 1:]
 
     def start(rng: np.random.Generator, batch: Batch, world: int) -> None:

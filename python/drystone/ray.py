@@ -1,4 +1,4 @@
-"""Worlds on many machines: actors of Ray that own batches (drystone[ray])."""
+"""Worlds on many machines: Ray actors that own batches (drystone[ray])."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from . import _check
 from ._batch import Batch, Snapshots
 from ._scene import Config, Scene
 
-# How often the same call may end its actor.
+# Number of times that one call may end its actor.
 MOST_DEATHS = 10
 
 
 class _Worlds:
-    """The worlds of an actor."""
+    """The worlds of one actor."""
 
     def __init__(self, scene: Scene, config: Config, worlds: int, states: list[bytes] | None) -> None:
         processors = int(_ray().get_runtime_context().get_assigned_resources().get("CPU", 1)) or 1
@@ -28,29 +28,29 @@ class _Worlds:
             self.batch.restore(Snapshots.from_bytes(states))
 
     def do(self, name: str, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
-        """A call of the batch, by its name."""
+        """Call a method of the batch by name."""
         return getattr(self.batch, name)(*arguments, **options)
 
 
 @dataclass
 class _Share:
-    """Worlds of a fleet, their actor, and what makes the actor anew."""
+    """The worlds of one actor in a fleet, and the data to rebuild the actor."""
 
     first: int
     count: int
     actor: Any = None
     kept: list[bytes] | None = None
-    # Calls that changed worlds since these bytes.
+    # Calls since `kept` that changed worlds.
     since: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = field(default_factory=list)
 
 
 class Fleet:
-    """Worlds 0 to num_worlds - 1 of a scene, spread over actors of `worlds_per_actor` worlds.
+    """Worlds 0 to num_worlds - 1 of a scene, distributed over actors with `worlds_per_actor` worlds each.
 
-    An actor that dies, with its process or its machine, is made again from bytes that are kept here every `keep_every` rollouts and from
-    the calls since: all hashes are as if it had never died. Ray must be initialized.
+    If an actor dies, with its process or its machine, it is rebuilt from bytes that are kept here every `keep_every`
+    rollouts, and from the calls since then. All hashes are the same as without the loss. Ray must be initialized.
 
-    ValueError: an argument that cannot be used. RuntimeError: a call ended its actor ten times.
+    ValueError: an argument is invalid. RuntimeError: a call ended its actor ten times.
     """
 
     def __init__(
@@ -79,7 +79,9 @@ class Fleet:
     def rollout(
         self, n: int, ctrl: ArrayLike | None = None, *, every: int = 1, record: Collection[str] = ("position",)
     ) -> dict[str, NDArray[Any]]:
-        """`Batch.rollout` of all worlds: `ctrl` is [num_worlds or 1, n or 1, U], and arrays begin with num_worlds."""
+        """`Batch.rollout` of all worlds. `ctrl` is [num_worlds or 1, n or 1, U], and the first axis of arrays is
+        num_worlds.
+        """
         numbers = None if ctrl is None else np.asarray(ctrl, np.float32)
         if numbers is not None and (numbers.ndim != 3 or numbers.shape[0] not in (1, self.num_worlds)):
             raise ValueError(f"ctrl has shape {numbers.shape}: must be ({self.num_worlds} or 1, {n} or 1, U)")
@@ -131,7 +133,7 @@ class Fleet:
         arguments: Callable[[_Share], tuple[tuple[Any, ...], dict[str, Any]]],
         changes: bool = False,
     ) -> list[Any]:
-        """A call of all actors, at the same time; what each gives."""
+        """Call all actors at the same time, and return their results."""
         calls = [(name, *arguments(share)) for share in self._shares]
         running = [share.actor.do.remote(*call) for share, call in zip(self._shares, calls, strict=True)]
         results, first_error = [], None
@@ -141,7 +143,7 @@ class Fleet:
             except Exception as error:
                 first_error = first_error or error
         if changes:
-            # A call that failed in some worlds moved others.
+            # A call that failed in some worlds changed others.
             for share, call in zip(self._shares, calls, strict=True):
                 share.since.append(call)
         if first_error is not None:
@@ -155,7 +157,7 @@ class Fleet:
             except self._ray.exceptions.RayActorError:
                 self.rebuilt += 1
                 self._begin(share)
-                # In the order of the calls, which is that of the actor.
+                # An actor runs its calls in this order.
                 for before in share.since:
                     share.actor.do.remote(*before)
                 running = share.actor.do.remote(*call)
@@ -164,7 +166,7 @@ class Fleet:
         raise RuntimeError(f"{call[0]} ended the actor of worlds {share.first} and on {MOST_DEATHS} times")
 
     def _keep(self) -> None:
-        """Keep bytes of all worlds where enough calls came since."""
+        """Keep bytes of all worlds after enough calls."""
         if all(len(share.since) >= self._keep_every for share in self._shares):
             for share, kept in zip(self._shares, self._all("save", lambda share: ((), {})), strict=True):
                 share.kept, share.since = kept, []

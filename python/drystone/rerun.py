@@ -1,4 +1,4 @@
-"""Runs as files of rerun, with contacts and errors beside the picture (drystone[rerun]). No viewer is needed to write them."""
+"""Runs as rerun files, with contacts and errors beside the picture (drystone[rerun]). Writing them needs no viewer."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ import numpy as np
 from . import _check
 from ._batch import MEASURES, Batch
 
-# Length of an arrow for the weight of a body of a ton over a step of 1/60 s (m).
+# Length of an arrow per impulse (m/(N s)): 1 m for the weight of a ton over a step of 1/60 s.
 ARROW = 1 / 163.5
 
 
 class log:
-    """Write steps of a world of a batch to a file `.rrd`: poses, arrows of contact impulses, and measures as curves.
+    """Write steps of one world of a batch to a `.rrd` file: poses, arrows of contact impulses, and measures as curves.
 
-    A context: `with drystone.rerun.log(batch, to="run.rrd") as run:` and `run.step(n)` in place of `batch.step(n)`. `every` steps a frame is written.
-    Contacts have impulses where the batch listens to "impulses". The shapes are those of `Scene.to_dict`, in the order of the bodies.
+    Use it as a context, `with drystone.rerun.log(batch, to="run.rrd") as run:`, and call `run.step(n)` instead of
+    `batch.step(n)`. It writes a frame after every `every` steps. Contacts have impulses if the batch listens to
+    "impulses". The shapes are those of `Scene.to_dict`, in the order of the bodies.
 
-    ValueError: an argument that cannot be used, or rerun is not installed.
+    ValueError: an argument is invalid, or rerun is not installed.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class log:
         self._recording.disconnect()
 
     def step(self, n: int = 1) -> None:
-        """Move all worlds of the batch by n steps, and write a frame every so many."""
+        """Advance all worlds of the batch by n steps, and write a frame after every `every` steps."""
         left = _check.whole("n", n)
         while left > 0:
             count = min(left, self._every)
@@ -74,7 +75,7 @@ class log:
             left -= count
 
     def frame(self) -> None:
-        """Write the world as it is."""
+        """Write the present state of the world."""
         k, rerun, recording = self._world, self._rerun, self._recording
         recording.set_time("step", sequence=int(self._batch.steps[k]))
         recording.set_time("time", duration=float(self._batch.time[k]))
@@ -108,7 +109,7 @@ class log:
         elif kind in ("convex_hull", "mesh"):
             mesh = rerun.Points3D(shape.get("points", shape.get("vertices")))
         else:
-            # A half-space or a height field has no end to draw.
+            # A half-space or a height field has no extent to draw.
             return
         pose = {"position": [0, 0, 0], "rotation": [0, 0, 0, 1], **shape}
         rotation = rerun.Quaternion(xyzw=pose["rotation"])

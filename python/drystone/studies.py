@@ -1,4 +1,4 @@
-"""Runs for surveys: which setting stands what, at what price."""
+"""Runs for surveys: whether scenes stand under their settings, and at what price."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ._scene import Config, Scene
 
 
 def stands(run: Mapping[str, Any]) -> dict[str, Any]:
-    """Let a scene stand, and measure it.
+    """Run a scene, and measure whether it stands.
 
-    `run` has `scene`, the parameters of the scene, `steps` (600), `config` (a dict of settings, with `preset`). The result: `stands` (the
-    share of the dynamic bodies that moved by less than a fifth of a meter), `overlap_max` (m), `joint_gap` (m), `fastest` (m/s), `price`
-    (substeps of all bodies in all steps that they were awake), `hash`.
+    `run` has `scene`, the parameters of the scene, `steps` (600 by default), and `config` (a dict of settings, with
+    `preset`). The result has `stands` (the share of the dynamic bodies that moved by less than 0.2 m), `overlap_max`
+    (m), `joint_gap` (m), `fastest` (m/s), `price` (substeps summed over awake bodies and steps), and `hash`.
 
     >>> from drystone.studies import stands
     >>> result = stands({"scene": "tower", "n": 3, "steps": 60})
@@ -44,7 +44,8 @@ CELL = 44
 def map_svg(
     rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str, *, title: str = "", low: float = 0.0, high: float = 1.0
 ) -> str:
-    """A map of a survey as SVG: a cell for each pair of `x` and `y`, whose color and number are the mean of `value` over its rows.
+    """A map of a survey as SVG. Each pair of `x` and `y` has a cell, with the mean of `value` over its rows as its
+    color and number.
 
     ValueError: no row has all three.
 
@@ -74,7 +75,7 @@ def map_svg(
 
 
 def means(rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str) -> dict[tuple[float, float], float]:
-    """The mean of `value` over the rows of each pair of `x` and `y`; rows without all three are left out.
+    """The mean of `value` over the rows of each pair of `x` and `y`. Rows without all three are left out.
 
     ValueError: no row has all three.
     """
@@ -88,7 +89,7 @@ def means(rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str) -> dict
 
 
 def table(rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str) -> str:
-    """The same as a table in Markdown.
+    """The same as a Markdown table.
 
     >>> from drystone.studies import table
     >>> print(table([{"n": 1, "gap": 0, "stands": 1.0}], "n", "gap", "stands"))
@@ -106,11 +107,11 @@ def table(rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str) -> str:
 
 
 def color_of(share: float) -> str:
-    """The color of a share from 0 to 1."""
+    """The color for a share from 0 to 1."""
     return "#" + "".join(f"{round(p + (q - p) * share):02x}" for p, q in zip(LOW, HIGH, strict=True))
 
 
 def text(x: float, y: float, words: str, color: str = "#000") -> str:
-    """Words around a place of a picture."""
+    """Text centered at a place of a picture."""
     safe = words.replace("&", "&amp;").replace("<", "&lt;")
     return f'<text x="{x:g}" y="{y:g}" fill="{color}">{safe}</text>'

@@ -448,7 +448,7 @@ impl Task<'_> {
                 }
             }
         }
-        // The columns of a world that fails or is interrupted are read afterwards.
+        // The columns of a failed or interrupted world are read afterwards.
         if step + 1 == steps {
             self.outputs.iter_mut().for_each(|(column, numbers)| member.read(*column, numbers));
         }

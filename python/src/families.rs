@@ -10,10 +10,10 @@ use pyo3::prelude::*;
 use crate::raised;
 use crate::scene::Config;
 
-/// How often overlap is measured in a run, and a signal is looked for.
+/// Number of times in a run at which overlap is measured, and at which signals are checked.
 const LOOKS: u32 = 20;
 
-/// A world of a family that ran, as a dict.
+/// A completed world of a family, as a dict.
 #[derive(IntoPyObject)]
 pub struct JudgedWorld {
     bodies: usize,
@@ -51,7 +51,7 @@ pub fn wilson(passed: usize, count: usize) -> [f64; 2] {
     families::wilson(passed, count)
 }
 
-/// Runs the world of a seed on one thread and holds it against its law.
+/// Runs the world of a seed on one thread and checks it against its law.
 #[pyfunction]
 pub fn judge(py: Python<'_>, family: &str, seed: u64, config: &Config) -> PyResult<JudgedWorld> {
     let family: Family = family.parse().map_err(raised)?;
@@ -115,7 +115,7 @@ fn judged(
     })
 }
 
-/// From the lowest to the highest point of what moves (m).
+/// Height from the lowest to the highest point of the dynamic bodies (m).
 fn height(world: &World) -> f64 {
     let ends = world.dynamic().map(|body| {
         let bounds = body.colliders.iter().map(|collider| collider.bounds(body.position, body.rotation));
@@ -125,7 +125,7 @@ fn height(world: &World) -> f64 {
     high - low
 }
 
-/// The heaviest of what moves over the lightest.
+/// Mass of the heaviest dynamic body divided by that of the lightest.
 fn mass_ratio(world: &World) -> f64 {
     let masses = || world.dynamic().map(|body| f64::from(body.mass.mass));
     masses().fold(f64::MIN, f64::max) / masses().fold(f64::MAX, f64::min)

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use crate::raised;
 use crate::scene::Scene;
 
-/// The device that draws, and the process that opened it: after a fork it is another's.
+/// The drawing device, and the process that opened it. A forked process cannot use the device of its parent.
 static DEVICE: Mutex<Option<(u32, wgpu::Device, wgpu::Queue)>> = Mutex::new(None);
 
 fn device() -> Result<(wgpu::Device, wgpu::Queue)> {
@@ -40,7 +40,7 @@ pub fn picture(world: &World, size: (u32, u32), look: Look) -> Result<Vec<u8>> {
     Ok(rgb)
 }
 
-/// The scene of a board, its rows as text, and side of a cell, radius of the ball (m) and largest tilt (degrees).
+/// The scene of a board, its rows as text, side of a cell (m), radius of the ball (m), and largest tilt (degrees).
 #[pyfunction]
 pub fn maze(board: &str) -> PyResult<(Scene, Vec<String>, f32, f32, f32)> {
     let map = Map::find(board).map_err(|error| raised(error.within("board")))?;

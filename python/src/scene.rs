@@ -88,7 +88,7 @@ impl Config {
     fn from_text(text: &str) -> PyResult<Self> {
         let config: SolverConfig = serde_json::from_str(text).map_err(|e| {
             let line = e.to_string();
-            // Remove the place in the text: the caller never saw that text.
+            // Remove the place in the text: the caller never saw the text.
             PyValueError::new_err(line.split(" at line ").next().unwrap_or_default().to_owned())
         })?;
         config.check().map_err(raised)?;

@@ -363,7 +363,7 @@ def test_masses_are_scaled_from_those_of_the_start() -> None:
 
 
 def test_a_scene_whose_bodies_come_and_go_is_refused_by_name() -> None:
-    with pytest.raises(ValueError, match="^conveyor: bodies come or leave by themselves, and a batch has worlds of constant bodies$"):
+    with pytest.raises(ValueError, match="^conveyor: the scene has spawners or leaving bodies, which a batch does not support$"):
         ds.Batch(ds.Scene.find("conveyor"))
 
 

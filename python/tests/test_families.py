@@ -125,7 +125,7 @@ def test_a_run_that_raises_is_a_row_that_does_not_pass(found: ds.Stability) -> N
         ({}, {"seeds": 0}, "seeds = 0: must be 1 or more"),
         ({}, {"seeds": [1.5]}, "seeds = 1.5: must be a whole number"),
         ({}, {"seeds": [2**60]}, f"seeds has {2**60}: must be at most 2^53"),
-        ({}, {"seeds": [3, 3]}, "seeds: one is there twice"),
+        ({}, {"seeds": [3, 3]}, "seeds: a seed occurs twice"),
         ({}, {"engine": "rays"}, "engine = 'rays': did you mean 'ray'?"),
     ],
 )

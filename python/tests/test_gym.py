@@ -178,7 +178,7 @@ def test_a_controller_wins_the_easy_board() -> None:
         if terminated[0]:
             break
     assert terminated[0] and rewards[0] == pytest.approx(1, abs=0.01)
-    with pytest.raises(ValueError, match="^board: \"esy\" is no board and no file; did you mean \"easy\"\\?"):
+    with pytest.raises(ValueError, match="^board: \"esy\" is neither a board nor a file; did you mean \"easy\"\\?"):
         maze(1, board="esy")
 
 

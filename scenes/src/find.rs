@@ -35,8 +35,8 @@ impl Scene {
     }
 
     /// `count` worlds of a scene in one world; bodies of different worlds never meet: see
-    /// [`World::beside`](drystone::World::beside). All worlds are equal. With `vary`, that parameter is one larger in each
-    /// world than in the one before.
+    /// [`World::beside`](drystone::World::beside). All worlds are equal. With `vary`, that parameter is one larger in
+    /// each world than in the one before.
     ///
     /// ```
     /// let towers = drystone_scenes::Scene::find_worlds("tower", &["n=4".into()], 3, Some("n"))?;
@@ -127,7 +127,7 @@ impl Scene {
     }
 }
 
-/// Reads a scene file. The error says that there is neither a scene nor a file of that name.
+/// Reads a scene file. If the name is unknown, the error suggests a scene.
 fn load_or_suggest(name_or_path: &str, parameters: &[String]) -> Result<Scene> {
     let path = Path::new(name_or_path);
     if !path.is_file() && path.extension().is_none_or(|e| e != "json") {
@@ -149,7 +149,7 @@ fn load(path: &Path) -> Result<Scene> {
 fn whole(scene: &str, parameters: &[String], key: &str) -> Result<f64> {
     let refusal = |known: &[&str], list: &str| {
         let hint = hint(key, known.iter().copied(), format_args!("it has: {list}"));
-        input!("{scene} has no whole number {key:?} to vary{hint}")
+        input!("{scene} has no whole-number parameter {key:?} to vary{hint}")
     };
     let entry = CATALOGUE.iter().find(|e| e.name == scene).ok_or_else(|| refusal(&[], "none, being a file"))?;
     let known: Vec<_> = entry.parameters.iter().filter(|p| p.whole).map(|p| p.name).collect();

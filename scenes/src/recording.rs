@@ -368,7 +368,7 @@ impl Replay {
         }
         ensure(rest.is_empty(), || "it has bytes after its end".into())?;
         let begins = states.first().is_some_and(|state| state.step == 0 && !state.is_jump);
-        ensure(begins, || "it has no beginning".into())?;
+        ensure(begins, || "it has no state at step 0".into())?;
         Ok(Self { title, states, steps, step: 0, agreed: 0, difference: None })
     }
 

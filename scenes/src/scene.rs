@@ -101,7 +101,7 @@ impl Scene {
     pub fn constant_world(&self) -> Result<&World> {
         let comes_and_goes = !self.spawners.is_empty() || !self.leaving.is_empty();
         ensure(!comes_and_goes, || {
-            format!("{}: bodies come or leave by themselves, and a batch has worlds of constant bodies", self.name)
+            format!("{}: the scene has spawners or leaving bodies, which a batch does not support", self.name)
         })?;
         Ok(&self.world)
     }

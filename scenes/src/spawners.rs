@@ -80,8 +80,8 @@ impl Spawners {
 
     /// Removes the bodies that leave before a step of `dt` seconds, then adds new bodies, spawner by spawner. If the
     /// place of a new body is occupied, it enters before the first step with a free place, and the interval to the next
-    /// body counts from then. A scene without spawners and leaving bodies costs nothing; each due body costs a look at
-    /// all bodies.
+    /// body counts from then. A scene without spawners and leaving bodies costs nothing. Each due body costs time in
+    /// proportion to the number of bodies.
     pub fn before_step(&mut self, world: &mut World, dt: f32) {
         let (steps, left) = (self.steps, &mut self.left);
         self.staying.retain(|staying| match world.body(staying.body) {

@@ -1,8 +1,8 @@
-// The axes of a joint: body a is held, limited or driven along each or about it. Doubles: src/kernels/axis.rs.
+// The axes of a joint, along which or about which body a is held, limited or driven. Twins: src/kernels/axis.rs.
 
 struct AxisMotion { along: vec3f, about_a: vec3f, about_b: vec3f, moved: f32 }
 
-// The vector by which a turned against b since the step began.
+// The rotation vector of a against b since the step began.
 fn relative_turn(pair: ptr<function, Pair>) -> vec3f {
     let q = quat_mul((*pair).a.dq, conjugate((*pair).b.dq));
     let half = q.xyz * select(1.0, -1.0, 0.0 > q.w);
@@ -14,20 +14,20 @@ const LEAST_SQUARE: f32 = 1e-12;
 
 struct AnchorMotion { now: vec3f, longer: f32 }
 
-// The direction of the anchors, and how much longer their distance is than when the step began, where the anchor of a shifted. Without a
-// length the direction is the one that b carried.
+// The direction between the anchors, and the growth of their distance since the step began, after a shift of the anchor
+// of a. Without a length the direction is the carried one.
 fn along_anchors(carried: vec3f, shift: vec3f, length: f32) -> AnchorMotion {
     let apart = carried * length + shift;
     let square = dot3(apart, apart);
     let has_direction = length > 0.0 && square > LEAST_SQUARE;
     let now = select(carried, apart * inverse_sqrt(square), has_direction);
-    // Without the cancellation of a difference of two lengths, unless the anchors passed each other.
+    // This form avoids the cancellation of a difference of two lengths, unless the anchors passed each other.
     let cosine = dot3(carried, now);
     let longer = dot3(carried + now, shift) * reciprocal(1.0 + cosine);
     return AnchorMotion(now, select(square * inverse_sqrt(square) - length, longer, cosine > 0.0));
 }
 
-// The axis now: as it was when the step began, turned with b; that of a distance follows the anchors.
+// The present axis. It turned with b since the step began. The axis of a distance follows the anchors.
 fn axis_motion(pair: ptr<function, Pair>, joint: Joint, axis: Axis) -> AxisMotion {
     let carried = axis.direction + turned((*pair).b.dq, axis.direction);
     let shift = -relative_movement(pair, joint.r_a, joint.r_b);
@@ -45,7 +45,7 @@ fn axis_motion(pair: ptr<function, Pair>, joint: Joint, axis: Axis) -> AxisMotio
     );
 }
 
-// How fast a moves against b.
+// Speed of a against b.
 fn axis_speed(rules: Rules, pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
     let u = dot3(motion.along, (*pair).a.v - (*pair).b.v)
         + (dot3(motion.about_a, (*pair).a.w) - dot3(motion.about_b, (*pair).b.w));
@@ -72,13 +72,13 @@ fn axis_inverse_mass(pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
     return dot3(motion.along, motion.along) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + (turn_a + turn_b);
 }
 
-// Rows that are no limits are further than this above their upper limit (m, rad).
+// Rows that are no limits are more than this above their upper limit (m, rad).
 const LEAST_LEFT: f32 = -5e17;
 
 // Whether a row is a lock: neither a limit nor a drive.
 fn is_lock(axis: Axis) -> bool { return LEAST_LEFT > axis.left && 0.5 > axis.mass_scale + axis.impulse_scale; }
 
-// Where the nearer of the two limits of an axis is.
+// Position relative to the nearer of the two limits of an axis.
 struct NearerLimit { is_limit: bool, is_upper: bool, gap: f32, apart: bool }
 
 fn nearer_limit(axis: Axis, motion: AxisMotion) -> NearerLimit {
@@ -90,18 +90,19 @@ fn nearer_limit(axis: Axis, motion: AxisMotion) -> NearerLimit {
     return NearerLimit(is_limit, is_upper, gap, is_limit && gap > 0.0);
 }
 
-// Sweeps one axis; with `but_locks` only if it is no lock.
+// Sweeps one axis. With `but_locks` it leaves out locks.
 fn solve_axis(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
     let motion = axis_motion(pair, joint, axis);
     let mass = reciprocal(axis_inverse_mass(pair, motion));
 
-    // Of two limits the nearer one acts: it pushes the body inwards.
+    // The nearer of the two limits acts. It pushes the body inward.
     let limit = nearer_limit(axis, motion);
     let gap = limit.gap;
     let apart = limit.apart;
     let sign = select(1.0, -1.0, limit.is_upper);
 
-    // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
+    // A motor acts in every sweep, and a spring in biased sweeps. Locks and limits close gaps softly, or not at all in
+    // a relax sweep.
     let is_drive = axis.mass_scale + axis.impulse_scale > 0.0;
     var rate = 0.0;
     var mass_scale = select(1.0, 0.0, axis.impulse_scale > 0.0);
@@ -111,7 +112,7 @@ fn solve_axis(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: J
         mass_scale = select(pass_row.joint.mass_scale, axis.mass_scale, is_drive);
         impulse_scale = select(pass_row.joint.impulse_scale, axis.impulse_scale, is_drive);
     }
-    // Apart from its limit the body may close the gap in this substep.
+    // A body away from its limit may reach it within this substep.
     rate = select(rate, pass_row.inverse_substep, apart);
     mass_scale = select(mass_scale, 1.0, apart);
     impulse_scale = select(impulse_scale, 0.0, apart);
@@ -135,13 +136,13 @@ fn solve_axes(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: J
     }
 }
 
-// The velocity that a lock lacks, or a limit that holds as one; none of a drive.
+// The velocity that a lock lacks, or a limit that holds like a lock; 0 for a drive.
 fn measure_axis(rules: Rules, pair: ptr<function, Pair>, joint: Joint, axis: Axis, k: u32) {
     let motion = axis_motion(pair, joint, axis);
     let limit = nearer_limit(axis, motion);
     var rate = 0.0;
     if rules.biased { rate = pass_row.joint.bias_rate; }
-    // Up to its limit the body goes within this substep.
+    // A body away from its limit may reach it within this substep.
     let pull = limit.gap * select(rate, pass_row.inverse_substep, limit.apart);
     let speed = axis_speed(rules, pair, motion);
     let wanted = select(speed + pull, speed - pull, limit.is_upper);
@@ -168,7 +169,7 @@ fn warm_start_axes(pair: ptr<function, Pair>, joint: Joint) {
     }
 }
 
-// The correction of the anchors of a joint: none where axes guide them.
+// The correction of the anchors of a joint; zero if axes guide them.
 fn of_anchors(joint: Joint, change: vec3f) -> vec3f {
     return select(change, vec3f(), joint.is_loose > 0.0);
 }

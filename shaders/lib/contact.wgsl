@@ -1,20 +1,20 @@
-// Non-penetration at one contact point. Doubles: src/kernels/contact.rs.
+// Non-penetration at one contact point. Twins: src/kernels/contact.rs.
 
-// How two bodies moved along a normal since the step began: a separation is linear in the arms.
+// Movement of two bodies along a normal since the step began. A separation is linear in the arms.
 struct NormalMovement { shift: f32, turn_a: vec3f, turn_b: vec3f }
 
 fn normal_movement(rules: Rules, pair: ptr<function, Pair>, contact: Contact) -> NormalMovement {
     let turn_a = turned(conjugate((*pair).a.dq), contact.normal);
     let turn_b = turned(conjugate((*pair).b.dq), contact.normal);
     var shift = dot3((*pair).b.dp - (*pair).a.dp, contact.normal);
-    // A round surface turns under its contact: the contact moves with the center of curvature.
+    // A round surface turns beneath its contact, so the contact moves with the center of curvature.
     if rules.round {
         shift = shift + contact.radius_a * dot3(turn_a, contact.normal) + contact.radius_b * dot3(turn_b, contact.normal);
     }
     return NormalMovement(shift, turn_a, turn_b);
 }
 
-// The separation that the solver uses: the separation at the begin of the step, less the preload, plus the movement since.
+// The separation that the solver uses: the separation when the step began, less the preload, plus the movement since.
 fn current_separation(movement: NormalMovement, contact: Contact, point: Point) -> f32 {
     return (point.separation - contact.preload) + (movement.shift + (dot3(movement.turn_b, point.r_b) - dot3(movement.turn_a, point.r_a)));
 }
@@ -24,16 +24,18 @@ fn pair_softness(pair: ptr<function, Pair>) -> Softness {
     return pass_row.fixed;
 }
 
-// The impulse pushes, never pulls: the sum of the corrections, or each by itself.
+// Clamps the normal impulse, which pushes and never pulls. The rules clamp the sum of the corrections, or each
+// correction.
 fn clamp_normal(rules: Rules, sum: f32, correction: f32) -> f32 {
     if rules.accumulated { return larger(sum + correction, 0.0); }
     return sum + larger(correction, 0.0);
 }
 
-// The change of the normal impulse that a point asks for by itself.
+// The change of the normal impulse that a point needs by itself.
 fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: f32) -> f32 {
     let s = current_separation(movement, contact, point);
-    // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
+    // Surfaces apart may close the gap in this substep. Overlapping surfaces are pushed apart softly, or not at all in
+    // a relax sweep.
     let apart = s > 0.0;
     let pushed = softness.bias_rate * smaller(s + params.slop, 0.0);
     let bias = select(select(0.0, pushed, rules.biased), s * pass_row.inverse_substep, apart);
@@ -42,7 +44,7 @@ fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, 
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
     let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
-    // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
+    // This limits the speed and not the force, so a contact at the limit still carries any load.
     let correction = select(spring, smaller(spring, -(mass * (vn - softness.push_limit))), rules.biased);
     return params.relaxation * correction;
 }
@@ -60,8 +62,8 @@ fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point
 // The impulse that a point would have by itself, and the normal velocity that it lacks.
 struct Wanted { sum: f32, lacking: f32 }
 
-// All points of a manifold: their changes, the sums of their arms by their changes and of their arms, how many they are, and the sums of changes,
-// gains and masses.
+// The points of a manifold together: the change of each, the sums of their arms weighted by changes and unweighted,
+// their number, and the sums of changes, gains and masses.
 struct Together {
     changes: array<f32, 4>, arms_a: vec3f, arms_b: vec3f, middle_a: vec3f, middle_b: vec3f, count: f32, all: f32, gain: f32, mass: f32
 }
@@ -80,8 +82,9 @@ fn add_point(together: ptr<function, Together>, k: u32, point: Point, impulse: f
     (*together).mass = (*together).mass + point.normal_mass;
 }
 
-// Changes the impulses of all points of a manifold together, by the share of what each would change by itself that leaves the least energy of
-// what they lack: steepest descent.
+// Changes the impulses of all points of a manifold together, by steepest descent. The direction is the vector of the
+// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
+// still lack.
 fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, together: ptr<function, Together>) {
     let turn_a = cross3((*together).arms_a, contact.normal);
     let turn_b = cross3((*together).arms_b, contact.normal);
@@ -110,7 +113,7 @@ fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, toget
     (*pair).b.w += spin_b * share;
 }
 
-// Non-penetration of all points together, before each is solved by itself.
+// Non-penetration of all points together, before each is solved alone.
 fn solve_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, softness: Softness, movement: NormalMovement) {
     var together = Together();
     for (var k = 0u; k < contact.point_count; k++) {

@@ -1,9 +1,9 @@
-// Friction at one point or over one manifold. Doubles: src/kernels/friction.rs.
+// Friction at one point or over one manifold. Twins: src/kernels/friction.rs.
 
-// x, no further from 0 than the limit.
+// x, at most the limit away from 0.
 fn clamp_abs(x: f32, limit: f32) -> f32 { return larger(smaller(x, limit), -limit); }
 
-// The tangential impulse nearest to y that the rule allows under the normal impulse's limit.
+// The tangential impulse nearest to y that the rule allows. `limit` follows from the normal impulse.
 fn allowed_friction(friction: u32, y: vec2f, limit: f32) -> vec2f {
     if friction != FRICTION_DISC { return vec2f(clamp_abs(y.x, limit), clamp_abs(y.y, limit)); }
     let length_squared = y.x * y.x + y.y * y.y;
@@ -11,8 +11,8 @@ fn allowed_friction(friction: u32, y: vec2f, limit: f32) -> vec2f {
     return vec2f(y.x * scale, y.y * scale);
 }
 
-// Coulomb friction: the sum of the tangential impulses stays within what the normal impulse allows. The step along both
-// tangents has one length: with a matrix step the clamped point would slip in a wrong direction.
+// Coulomb friction. It keeps the sum of the tangential impulses within the limit of the normal impulse. Both tangents
+// share one step length. With a matrix step the clamped point would slip in a wrong direction.
 fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, normal_impulse: f32, impulse: ptr<function, Impulse>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
     let u = relative_velocity(rules, pair, point.r_a, point.r_b);
@@ -26,7 +26,7 @@ fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, poi
     let mass = params.relaxation * point.tangent_mass;
     var sum: vec2f;
     if rules.friction == FRICTION_SLIP {
-        // One direction: the impulses along both tangents are its components.
+        // The impulses along both tangents are the components of one impulse along the slip.
         let along = (*impulse).tangent_1 * point.slip_1 + (*impulse).tangent_2 * point.slip_2;
         let s = clamp_abs(along - mass * (u_1 * point.slip_1 + u_2 * point.slip_2), limit);
         sum = vec2f(s * point.slip_1, s * point.slip_2);
@@ -42,7 +42,8 @@ fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, poi
     apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
 }
 
-// Spin about the normal, limited by the normal impulses times their distance from the middle.
+// Friction against the spin about the normal, limited by the sum of the normal impulses times their distances from the
+// middle.
 fn solve_twist(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_point: Point, lever: f32, impulse: ptr<function, Impulse>) {
     var w = (*pair).b.w - (*pair).a.w;
     if rules.from_start { w = w + ((*pair).start_b.w - (*pair).start_a.w); }

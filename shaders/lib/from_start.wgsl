@@ -1,4 +1,5 @@
-// The velocities of a body are changes since the step began: the velocities from then. Double: start_of in src/kernels/integrate.rs.
+// Velocities of bodies are changes since the step began. This loads the velocities at that time. Twin: start_of in
+// src/kernels/integrate.rs.
 
 fn load_start(mass: Mass, body: u32) -> Free {
     return Free(select(vec3f(0.0), free[body].v, mass.inv_mass > 0.0), select(vec3f(0.0), free[body].w, mass.inv_mass > 0.0));

@@ -1,13 +1,13 @@
-// One ball joint: the anchors of two bodies stay together. Doubles: src/kernels/joint.rs.
+// One joint, which keeps the anchors of two bodies together. Twins: src/kernels/joint.rs.
 
 struct Anchors { r_a: vec3f, r_b: vec3f }
 
-// The arms now: those at the begin of the step, turned with their bodies.
+// The present arms. They turned with their bodies since the step began.
 fn current_anchors(pair: ptr<function, Pair>, joint: Joint) -> Anchors {
     return Anchors(joint.r_a + turned((*pair).a.dq, joint.r_a), joint.r_b + turned((*pair).b.dq, joint.r_b));
 }
 
-// The column of [r] I^-1 [r]^T that belongs to the axis e: r x (I^-1 (r x e)), with its sign.
+// The column for the axis e of one body's contribution to G M^-1 G^T: (I^-1 (r x e)) x r.
 fn turning_column(m: Mass, r: vec3f, e: vec3f) -> vec3f {
     return cross3(inv_inertia_times(m, cross3(r, e)), r);
 }
@@ -18,7 +18,7 @@ fn joint_column(pair: ptr<function, Pair>, anchors: Anchors, e: vec3f) -> vec3f 
     return e * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turning;
 }
 
-// Rounding changes the determinant of a block of trace 1 to 2 by 3e-7; this is 2^-19.
+// 2^-19. Rounding changes the determinant of a block with a trace of 1 to 2 by 3e-7.
 const STIFFENING: f32 = 1.9073486328125e-6;
 
 // Solves the symmetric block with these columns for u, by Cramer's rule.

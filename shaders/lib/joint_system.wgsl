@@ -1,9 +1,11 @@
-// All joints of a connected set of bodies, solved at once: S = L D L^T in blocks of 3 x 3. Doubles: src/kernels/joint_system.rs.
+// All joints of a connected set of bodies, solved directly by S = L D L^T in blocks of 3 x 3. Twins:
+// src/kernels/joint_system.rs.
 
-// The least pivot of a row, relative to the sum of those of its block in S: 2^-20.
+// The smallest pivot of a row, relative to the trace of its block in S: 2^-20.
 const LEAST_PIVOT: f32 = 9.5367431640625e-7;
 
-// Where the lists of the systems begin in their buffer, in numbers. Layout: src/backend/gpu/rows.rs.
+// The lists of the systems in their common buffer. Its first numbers are the starts of the lists. Layout:
+// src/backend/gpu/rows.rs.
 fn begin_of_system(system: u32) -> u32 { return joint_systems[joint_systems[0] + system]; }
 fn softness_of_system(system: u32) -> f32 { return bitcast<f32>(joint_systems[joint_systems[1] + system]); }
 fn joint_of_node(node: u32) -> u32 { return joint_systems[joint_systems[2] + 4u * node]; }
@@ -17,16 +19,16 @@ fn end_term_of_block(block: u32) -> u32 { return joint_systems[joint_systems[3] 
 fn left_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term]; }
 fn right_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term + 1u]; }
 
-// The softness of a node whose system is not factored since it began.
+// Marks, as a softness, a node whose system has not been factored since it began.
 const NOT_FACTORED: f32 = -1.0;
 
-// The rows of a node that holds the anchors of a joint together.
+// The rows of a node that keeps anchors together.
 const ANCHORS: u32 = 0xffffffffu;
 
-// One more than the number of the axis that is row i of a node, among those of the joint; 0 for no row.
+// The number of the axis that is row i of a node, among those of the joint, plus 1; 0 for no row.
 fn axis_of_row(rows: u32, i: u32) -> u32 { return (rows >> (8u * i)) & 0x7fu; }
 
-// Whether row i of a node is a limit: it holds while it bears an impulse, and is not there otherwise.
+// Whether row i of a node is a limit. A limit takes part only while its impulse is not zero.
 fn is_limit_row(rows: u32, i: u32) -> bool { return ((rows >> (8u * i)) & 0x80u) != 0u; }
 
 fn block_times(m: mat3x3f, u: vec3f) -> vec3f { return m[0] * u.x + m[1] * u.y + m[2] * u.z; }
@@ -66,11 +68,11 @@ fn with_diagonal(m: mat3x3f, more: f32) -> mat3x3f {
     );
 }
 
-// One over a pivot of a row; zero of a row that is not there.
+// One over a pivot of at least `least`; 0 for a row whose diagonal was zero in S.
 fn inverse_of_row(d: f32, least: f32, own: f32) -> f32 { return select(0.0, reciprocal(larger(d, least)), own > 0.0); }
 
-// A pivot whose rows had this diagonal in S as l d l^T: below the diagonal l, on it 1/d, which is zero in a row that is not there and had a
-// zero in S.
+// The factors l d l^T of a pivot, whose diagonal in S was `own`. The result has l below the diagonal, and 1/d on it. In
+// a missing row, whose diagonal in S is zero, 1/d is zero.
 fn factored_pivot(pivot: mat3x3f, own: vec3f) -> mat3x3f {
     let x = pivot[0];
     let y = pivot[1];
@@ -86,33 +88,33 @@ fn factored_pivot(pivot: mat3x3f, own: vec3f) -> mat3x3f {
     return mat3x3f(vec3f(d_x, l_xy, l_xz), vec3f(0.0, d_y, l_yz), vec3f(0.0, 0.0, d_z));
 }
 
-// The block of L D below a factored pivot, from that of S.
+// The block of L D below a factored pivot, from the block of S less its products.
 fn block_over(block: mat3x3f, pivot: mat3x3f) -> mat3x3f {
     let y = block[1] - block[0] * pivot[0].y;
     return mat3x3f(block[0], y, block[2] - block[0] * pivot[0].z - y * pivot[1].z);
 }
 
-// l^-1 u of a factored pivot.
+// l^-1 u, where `pivot` is factored.
 fn forward(pivot: mat3x3f, u: vec3f) -> vec3f {
     let second = u.y - pivot[0].y * u.x;
     return vec3f(u.x, second, u.z - pivot[0].z * u.x - pivot[1].z * second);
 }
 
-// l^-T u of a factored pivot.
+// l^-T u, where `pivot` is factored.
 fn backward(pivot: mat3x3f, u: vec3f) -> vec3f {
     let second = u.y - pivot[1].z * u.z;
     return vec3f(u.x - pivot[0].y * second - pivot[0].z * u.z, second, u.z);
 }
 
-// How one side of a row of S moves under one side of a column: along, and about.
+// Movement of one side of a row of S under one side of a column: shift and rotation.
 fn movement(shift: mat3x3f, inv_mass: f32, about: mat3x3f, turn: mat3x3f) -> mat3x3f {
     return block_sum(block_product(about, turn), mat3x3f(shift[0] * inv_mass, shift[1] * inv_mass, shift[2] * inv_mass));
 }
 
-// Both sides of a joint, as those of `shared_sides`.
+// The sides that a joint shares with itself, in the bits of `shared_sides`.
 const OWN_SIDES: u32 = 9u;
 
-// The block of S in the column of one node and the row of another, which may be the same.
+// The block of S in the column of one node and the row of another node, or of the same.
 fn coupling(column: u32, row: u32, shared_sides: u32) -> mat3x3f {
     let shift = product_with_transpose(joint_nodes[row].along, joint_nodes[column].along);
     let mass_a = joint_nodes[column].mass_a;
@@ -133,7 +135,7 @@ fn coupling(column: u32, row: u32, shared_sides: u32) -> mat3x3f {
     return block;
 }
 
-// Factors one system whose nodes are known.
+// Factors a system after its nodes are written.
 fn factor_blocks(system: u32) {
     let end = begin_of_system(system + 1u);
     for (var node = begin_of_system(system); node < end; node++) {

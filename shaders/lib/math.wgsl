@@ -1,5 +1,5 @@
-// Arithmetic that gives the same bits everywhere: + - * and comparisons only, in a written order.
-// Doubles: src/math.rs.
+// Arithmetic with the same bits everywhere. It uses only + - * and comparisons, in a written order.
+// Twins: src/math.rs.
 
 fn larger(a: f32, b: f32) -> f32 { return select(b, a, a > b); }
 
@@ -21,10 +21,10 @@ fn inverse_sqrt(x: f32) -> f32 {
     return y;
 }
 
-// One over the power of two in x: x times it is of size 1 to 2. For normal x of either sign below 2^127.
+// One over the power of two in x. Its product with x has the size 1 to 2. For normal x of either sign below 2^127.
 fn inverse_power(x: f32) -> f32 { return bitcast<f32>(0x7f000000u - (bitcast<u32>(x) & 0x7f800000u)); }
 
-// 1/x, of either sign. Scaled, so that no square leaves single precision.
+// 1/x, of either sign. It is scaled, so that no square leaves single precision.
 fn reciprocal(x: f32) -> f32 {
     let scale = inverse_power(x);
     let scaled = x * scale;
@@ -32,7 +32,7 @@ fn reciprocal(x: f32) -> f32 {
     return scaled * (y * y) * scale;
 }
 
-// The inverse inertia of a body, times a vector. Double: src/kernels/rows.rs.
+// The inverse inertia of a body, times a vector. Twin: Sym3::times in src/problem/arithmetic.rs.
 fn inv_inertia_times(m: Mass, u: vec3f) -> vec3f {
     let p = m.inv_inertia_x;
     let q = m.inv_inertia_yz;
@@ -52,18 +52,18 @@ fn quat_mul(a: vec4f, b: vec4f) -> vec4f {
     );
 }
 
-// How far the rotation q moves the arm r: q r - r, without the cancellation of that difference.
+// The movement of the arm r by the rotation q: q r - r, without the cancellation of this difference.
 fn turned(q: vec4f, r: vec3f) -> vec3f {
     let axis = q.xyz;
     let t = cross3(axis, r);
     return (t * q.w + cross3(axis, t)) * 2.0;
 }
 
-// The same rotation backwards.
+// The inverse rotation.
 fn conjugate(q: vec4f) -> vec4f { return vec4f(-q.xyz, q.w); }
 
-// The rotation by the vector r [rad], from the series of cos and sinc of half the angle (to 1e-5 at 4 rad). A longer vector turns
-// by 4 rad: the series would leave the unit quaternions, and soon the finite numbers.
+// The rotation by the vector r (rad), from the series of cos and sinc of half the angle, to 1e-5 at 4 rad. A longer
+// vector turns by 4 rad, because the series would leave the unit quaternions, and soon the finite numbers.
 fn exp_rotation(r: vec3f) -> vec4f {
     let half = r * 0.5;
     let square = dot3(half, half);
@@ -75,17 +75,17 @@ fn exp_rotation(r: vec3f) -> vec4f {
     return vec4f(u.x * sinc, u.y * sinc, u.z * sinc, cosine);
 }
 
-// A nearly unit quaternion, closer to unit length by one Newton step.
+// A nearly unit quaternion, brought closer to unit length by one Newton step.
 fn renormalized(q: vec4f) -> vec4f {
     let s = 1.5 - 0.5 * (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
     return vec4f(q.x * s, q.y * s, q.z * s, q.w * s);
 }
 
-// What the inverse of a symmetric block is made of.
+// The parts of the inverse of a symmetric block.
 struct Cofactors { x: vec3f, y: vec3f, z: vec3f, determinant: f32, scale: f32 }
 
-// The cofactors of the symmetric block with these columns, scaled to a trace of 1 to 2 before. One whose determinant is below `stiffening`
-// is made stiffer by that. Double: src/kernels/joint.rs.
+// The cofactors of the symmetric block with these columns. The block is first scaled to a trace of 1 to 2. If its
+// determinant is below `stiffening`, this number is added to the diagonal. Twin: src/kernels/joint.rs.
 fn cofactors(column_x: vec3f, column_y: vec3f, column_z: vec3f, stiffening: f32) -> Cofactors {
     let scale = inverse_power(column_x.x + column_y.y + column_z.z);
     var x = column_x * scale;

@@ -1,6 +1,7 @@
-// The end of the sweeps of a substep, in programs with a kernel that measures corrections. Other programs have lib/unmeasured.wgsl.
+// Convergence of the sweeps of a substep, for programs with a kernel that measures corrections. Other programs use
+// lib/unmeasured.wgsl.
 
-// Notes that a correction was above the tolerance: an impulse, against the mass that it moved.
+// Records whether an impulse changes a velocity by more than the tolerance. `mass` is its effective mass.
 fn note_correction(measured: bool, impulse: f32, mass: f32) {
     if measured && larger(impulse, -impulse) > params.tolerance * mass { atomicStore(&convergence.moving, 1u); }
 }

@@ -1,4 +1,4 @@
-// Joints that hold their anchors together, and nothing else. Twin: lib/axes.wgsl.
+// The functions of lib/axes.wgsl for programs whose joints have no axes.
 
 fn solve_axes(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: Joint) {}
 

@@ -1,8 +1,8 @@
-// Two bodies while one thread works on them. Doubles: src/kernels/pair.rs.
+// Two bodies that one thread works on. Twins: src/kernels/pair.rs.
 
 struct Pair { a: Body, b: Body, mass_a: Mass, mass_b: Mass, start_a: Free, start_b: Free }
 
-// How an impulse turns a body: its inverse inertia times the moment u.
+// The change of a body's spin by an impulse with the moment u: its inverse inertia times u.
 fn spin_of(isotropic: bool, m: Mass, u: vec3f) -> vec3f {
     if isotropic { return u * m.inv_inertia_x.x; }
     return inv_inertia_times(m, u);
@@ -38,7 +38,7 @@ fn load_pair(a: u32, b: u32) -> Pair {
     return Pair(bodies[a], bodies[b], masses[a], masses[b], load_start(masses[a], a), load_start(masses[b], b));
 }
 
-// A body that cannot move is never written: no color protects it.
+// An immovable body is never written, because no color protects it.
 fn store_pair(a: u32, b: u32, pair: ptr<function, Pair>) {
     if (*pair).mass_a.inv_mass > 0.0 {
         bodies[a].v = (*pair).a.v;

@@ -1,4 +1,4 @@
-// Effective masses of contact points. Doubles: src/problem/arithmetic.rs.
+// Effective masses of contact points. Twins: src/problem/arithmetic.rs.
 
 const LEAST_JAMMING: f32 = 0.53;
 
@@ -15,7 +15,7 @@ fn square_root(x: f32) -> f32 {
     return select(0.0, safe * inverse_sqrt(safe), is_normal);
 }
 
-// A unit vector across a unit normal.
+// A unit vector perpendicular to a unit normal.
 fn tangent_of(n: vec3f) -> vec3f {
     let sign = select(1.0, -1.0, 0.0 > n.z);
     let a = -(sign * inverse_or_zero(1.0 + sign * n.z));
@@ -31,9 +31,9 @@ fn entry(a: Mass, b: Mass, r_a: vec3f, r_b: vec3f, d: vec3f, e: vec3f) -> f32 {
     return entry_of(a, r_a, d, e) + entry_of(b, r_b, d, e);
 }
 
-// One over the largest eigenvalue of the tangential block; 0 for no block.
+// One over the largest eigenvalue of the tangential block; 0 if the block is zero.
 fn tangent_mass(s_11: f32, s_22: f32, s_12: f32) -> f32 {
-    // Squares of a light body's entries would leave single precision.
+    // The squares of the entries of a light body would leave single precision.
     let scale = inverse_power(s_11 + s_22);
     let scaled_11 = s_11 * scale;
     let scaled_22 = s_22 * scale;
@@ -43,7 +43,7 @@ fn tangent_mass(s_11: f32, s_22: f32, s_12: f32) -> f32 {
     return scale * inverse_or_zero(0.5 * (scaled_11 + scaled_22 + root));
 }
 
-// The largest change of the normal velocity by friction over that by the normal impulse.
+// The ratio of the largest change of the normal velocity by friction to the change by the normal impulse.
 fn jamming(friction: f32, parted: f32, pressed_1: f32, pressed_2: f32) -> f32 {
     let scale = inverse_power(parted);
     let scaled_1 = pressed_1 * scale;
@@ -55,7 +55,7 @@ fn jamming(friction: f32, parted: f32, pressed_1: f32, pressed_2: f32) -> f32 {
 
 fn normal_step(ratio: f32) -> f32 { return select(1.0, inverse_or_zero(1.0 + ratio), ratio > 1.0); }
 
-// One over the inverse inertia about the normal.
+// One over the sum of the inverse inertias of both bodies about the normal.
 fn twist_mass(frame: Contact, a: Mass, b: Mass) -> f32 {
     let n = frame.normal;
     return inverse_or_zero(dot3(n, inv_inertia_times(a, n)) + dot3(n, inv_inertia_times(b, n)));

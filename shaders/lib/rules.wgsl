@@ -1,5 +1,5 @@
-// The rules of a kernel, which every call gives as a constant. Twin: Rules in src/kernels/mod.rs; rules_text in src/backend/gpu/wgsl.rs
-// writes the fields in this order.
+// The rules of a kernel, which every call gives as a constant. Twin: Rules in src/kernels/mod.rs. rules_text in
+// src/backend/gpu/wgsl.rs writes the fields in this order.
 
 struct Rules {
     biased: bool,
@@ -9,14 +9,14 @@ struct Rules {
     friction_first: bool,
     accumulated: bool,
     round: bool,
-    // The points of a manifold are solved together before each by itself.
+    // The points of a manifold are solved together before each is solved alone.
     as_one: bool,
     passes: u32,
     driven: bool,
     measured: bool,
     // Velocities of bodies are changes since the step began.
     from_start: bool,
-    // Every body that can move has the same moment of inertia about all axes.
+    // Every movable body has the same moment of inertia about all axes.
     isotropic: bool,
     // Points keep the largest normal impulse of the step.
     bounces: bool,

@@ -1,4 +1,5 @@
-// The rows of a StepProblem. Layout, names and units: src/problem/rows.rs, held together by tests/cpu/shaders.rs.
+// The rows of a StepProblem. src/problem/rows.rs has the layout, names and units, and tests/cpu/shaders.rs compares the
+// layouts.
 
 struct Body { v: vec3f, w: vec3f, dp: vec3f, dq: vec4f }
 
@@ -39,7 +40,7 @@ struct Axis {
 
 struct JointImpulse { linear: vec3f }
 
-// Up to three rows of a joint while its system is factored; `right` is the right side, then the correction. Double:
+// Up to three rows of a joint while its system is factored. `right` is the right-hand side, then the correction. Twin:
 // src/kernels/joint_system.rs.
 struct JointNode {
     along: mat3x3f,
@@ -68,12 +69,12 @@ struct Params {
     restitution_threshold: f32, slop: f32, relaxation: f32, tolerance: f32,
     body_count: u32, point_count: u32, joint_count: u32, patches: u32,
     axis_count: u32,
-    // 0, which no compiler knows: exact mode in WGSL.
+    // Always 0. Shader compilers cannot know this, and the exact mode in WGSL relies on it.
     zero: u32,
 }
 
-// What one dispatch sweeps: colors, one after another, with the substep of their block. The buffer `colors` holds where each color begins,
-// then where the last one ends, then the rows of the colors.
+// The colors that one dispatch sweeps in order, and the substep of their block. The buffer `colors` holds the start of
+// each color, then the end of the last, then the rows of the colors.
 struct PassRow {
     first: u32, end: u32,
     substep: f32, inverse_substep: f32,
@@ -84,25 +85,26 @@ struct PassRow {
 
 struct Preload { movable_compliance: f32, fixed_compliance: f32, share: f32, warm_start: u32 }
 
-// What the programs that begin a step on the device are told. Layout: src/backend/gpu/resident.rs.
+// Parameters of the programs that begin a step on the device. Layout: src/backend/gpu/resident.rs.
 struct ResidentParams {
     preload: Preload,
     body_count: u32,
-    // Number of contacts that take part, and where their rows begin in `colors`.
+    // Number of contacts that take part, and the start of their rows in `colors`.
     contact_count: u32, order: u32,
     written_count: u32,
     // 1 if the host sent all points.
     has_points: u32,
     // 1 if friction at points has two directions.
     tangents: u32,
-    // 0, which no compiler knows: exact mode in WGSL.
+    // Always 0. Shader compilers cannot know this, and the exact mode in WGSL relies on it.
     zero: u32,
 }
 
-// A contact whose rows the host computed anew. A byte for each of its points holds the number that the point had before.
+// A contact whose rows the host computed anew. One byte for each point holds the number that the point had before.
 struct Written { row: u32, points_before: u32 }
 
-// Its manifold. Arms of its points are six numbers each, from number `first_arms` on.
+// The manifold of such a contact. The arms of a point are six numbers, and `first_arms` counts the points before its
+// own.
 struct WrittenContact {
     normal: vec3f, friction: f32,
     restitution: f32, radius_a: f32, radius_b: f32, substep_share: f32,

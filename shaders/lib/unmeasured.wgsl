@@ -1,4 +1,4 @@
-// The functions of lib/measured.wgsl for programs in which no kernel measures corrections: they ask for no buffer.
+// The functions of lib/measured.wgsl for programs in which no kernel measures corrections. They need no buffer.
 
 fn note_correction(measured: bool, impulse: f32, mass: f32) {}
 

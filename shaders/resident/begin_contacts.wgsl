@@ -1,6 +1,7 @@
-// begin_contacts: one thread writes the separations of the points of one manifold, and its preload, which follows from the impulses of the
-// step before. Reads colors, separations, masses. Writes contacts, points, impulses; one thread a manifold. Doubles: Writer::write_slot in
-// src/problem/write.rs, yielding and preloaded in src/problem/carry.rs.
+// begin_contacts: one thread writes the separations of the points of one manifold, and its preload, which follows from
+// the impulses of the step before.
+// Reads colors, separations, masses. Writes contacts, points, impulses; one thread for each manifold.
+// Twins: Over::begin in src/problem/prepare.rs, yielding and preloaded in src/problem/carry.rs.
 
 fn yielding(share: f32, both_movable: bool, pressed: f32) -> f32 {
     let compliance = select(resident.preload.fixed_compliance, resident.preload.movable_compliance, both_movable);
@@ -8,7 +9,7 @@ fn yielding(share: f32, both_movable: bool, pressed: f32) -> f32 {
 }
 
 fn preloaded(before: f32, sag: f32) -> f32 {
-    // A contact that bears less has less preload at once.
+    // The preload ends with the load.
     return smaller(before + resident.preload.share * (sag - before), 2.0 * sag);
 }
 

@@ -1,9 +1,11 @@
-// write_contacts: one thread computes the rows of one manifold that the host found anew, and moves its impulses to the new points
-// and tangents.
-// Reads masses, written, written_contacts, written_arms. Writes contacts, points, impulses; one thread a manifold.
-// Doubles: Writer::write_header, write_masses, patch_of, bring_impulses and retangented in src/problem/write.rs and prepare.rs.
+// write_contacts: one thread computes the rows of one manifold that the host found anew, and moves its impulses to the
+// new points and tangents.
+// Reads masses, written, written_contacts, written_arms. Writes contacts, points, impulses; one thread for each
+// manifold.
+// Twins: Writer::write_header, patch_of, bring_impulses and retangented in src/problem/write.rs, write_masses in
+// src/problem/prepare.rs.
 
-// Rules and materials are those of the step before: where they change, no row stays on the device.
+// Rules and materials are those of the step before. If they change, no row stays on the device.
 fn retangented(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
     let friction = before.tangent * impulse.tangent_1 + cross3(before.normal, before.tangent) * impulse.tangent_2;
     let tangent_2 = cross3(now.normal, now.tangent);
@@ -12,7 +14,7 @@ fn retangented(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
 
 fn written_arm(at: u32) -> vec3f { return vec3f(written_arms[at], written_arms[at + 1u], written_arms[at + 2u]); }
 
-// The points of a contact, and the patch that follows them.
+// Writes the points of a contact, and the patch that follows them.
 fn write_points(contact: Contact, first_arms: u32) {
     let a = masses[contact.body_a];
     let b = masses[contact.body_b];

@@ -1,9 +1,9 @@
 //! Measures the scene size from which a GPU is faster, with small piles that are the same on every machine.
 //!
 //! For each backend, a step has a fixed cost (dispatches and transfers, or waking threads) and a cost for each body.
-//! Two piles give both numbers; on a GPU the smaller one is almost only fixed cost. Such a pile has the contacts,
-//! colors and substeps of a settled pile of boxes with the default plan. As in a run, the GPU keeps rows of an earlier
-//! step.
+//! Two piles give both numbers; on a GPU the time of the smaller one is almost only fixed cost. Each pile has the
+//! contacts, colors and substeps of a settled pile of boxes with the default plan. As in a run, the GPU keeps rows of
+//! an earlier step.
 
 use super::{Backend, CheckedStep};
 use crate::config::SolverConfig;
@@ -129,7 +129,7 @@ mod tests {
         let found = crossing(BODIES, cpu, gpu).expect("they cross");
         assert!((4096..=4097).contains(&found), "{found}");
         assert!(cpu[0] < gpu[0] && cpu[1] > gpu[1]);
-        // With the roles swapped, the GPU is faster only for few bodies, so there is no number from which it is faster.
+        // With the roles swapped, the GPU is faster only for few bodies, and there is no crossover.
         assert_eq!(crossing(BODIES, gpu, cpu), None);
     }
 

@@ -44,7 +44,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
     for (i, Pass { kernel, block, colors }) in passes.iter().enumerate() {
         let refuse = |what: String| Err(Error::input(format!("pass {i}, {}: {what}", kernel.name())));
         let Some(own) = problem.blocks.get(*block as usize) else {
-            return refuse(format!("block {block}: there are {}", problem.blocks.len()));
+            return refuse(format!("block {block}: must be less than {}", problem.blocks.len()));
         };
         let [contacts, joints, bodies, inertias, systems, turning] = own.colors();
         let (known, patch) = match kernel {
@@ -68,7 +68,7 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             _ => (0..0, None),
         };
         if colors.start > colors.end || !(colors.is_empty() || known.start <= colors.start && colors.end <= known.end) {
-            return refuse(format!("colors {colors:?}: there are {known:?}"));
+            return refuse(format!("colors {colors:?}: must be within {known:?}"));
         }
         let sums = match kernel {
             Kernel::SumImpulses { .. } => Some(("totals", problem.totals.len())),
@@ -76,13 +76,14 @@ fn check_passes(problem: &StepProblem, passes: &[Pass]) -> Result<()> {
             _ => None,
         };
         if let Some((name, 0)) = sums.filter(|_| !colors.is_empty()) {
-            return refuse(format!("{name}: there are none"));
+            return refuse(format!("needs {name}, but the problem has none"));
         }
         if matches!(kernel, Kernel::Extrapolate { .. }) && problem.blocks.len() > 1 {
-            return refuse("goes over all bodies: there is more than one block".into());
+            return refuse("acts on all bodies, so the problem must have one block".into());
         }
         if let Some(patch) = patch.filter(|patch| !problem.contacts.is_empty() && *patch != problem.has_patches()) {
-            return refuse(format!("patch = {patch}: the contacts of this problem say otherwise"));
+            let have = if patch { "have no patches" } else { "have patches" };
+            return refuse(format!("patch = {patch}: the contacts of this problem {have}"));
         }
     }
     Ok(())

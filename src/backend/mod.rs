@@ -59,7 +59,8 @@ pub trait Backend: Send {
     /// state: the next run can continue with more sweeps of the same problem.
     ///
     /// # Errors
-    /// [`CheckedStep::new`] refuses the problem or the passes, the problem does not fit the device, or the device is lost.
+    /// [`CheckedStep::new`] refuses the problem or the passes, the problem does not fit the device, or the device is
+    /// lost.
     fn run(&mut self, problem: &mut StepProblem, passes: &[Pass]) -> Result<()> {
         self.run_checked(CheckedStep::new(problem, passes)?)
     }

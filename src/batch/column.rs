@@ -47,7 +47,8 @@ pub enum Column {
     Friction,
     /// Restitution coefficient of each body.
     Restitution,
-    /// Mass of each body, with its moments of inertia, over that at the start of the world; 1 of a body without mass, which keeps none.
+    /// Factor on the mass and moments of inertia of each body, relative to the start of the world; 1 for a body without
+    /// mass, which stays without mass.
     MassScale,
     /// Gravity of the world (m/s²).
     Gravity,
@@ -219,11 +220,11 @@ impl Member {
         }
     }
 
-    /// Sets a column: poses, velocities, forces, torques, materials, masses, gravity or drives. Rows of vacant bodies are
-    /// skipped. Contacts that still touch keep their impulses, and so do joints.
+    /// Sets a column: poses, velocities, forces, torques, materials, masses, gravity or drives. Rows of vacant bodies
+    /// are skipped. Joints, and contacts that still touch, keep their impulses.
     ///
     /// # Errors
-    /// The column is derived from others and cannot be written, or there are fewer numbers than it has. The next step
+    /// The column is derived from others and cannot be written, or there are fewer numbers than it needs. The next step
     /// checks the values.
     pub fn write(&mut self, column: Column, values: &[f32]) -> Result<()> {
         if column == Column::MassScale {
@@ -241,7 +242,7 @@ impl Member {
         for (i, &scale) in scales.iter().enumerate().take(bodies.len()) {
             let first = start.world().bodies.get(i).filter(|first| first.mass.mass > 0.0);
             let Some(first) = first.filter(|_| !bodies.is_vacant(i)) else { continue };
-            // A mass that does not change keeps its bits.
+            // An unchanged mass keeps its bits.
             if scale == scale_of(&bodies[i], Some(first)) {
                 continue;
             }
@@ -256,7 +257,7 @@ impl Member {
     }
 }
 
-/// The mass of a body over that which it had first.
+/// The mass of a body divided by its mass at the start; 1 for a body without mass.
 fn scale_of(body: &Body, first: Option<&Body>) -> f32 {
     first.filter(|first| first.mass.mass > 0.0).map_or(1.0, |first| body.mass.mass / first.mass.mass)
 }

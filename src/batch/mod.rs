@@ -325,7 +325,7 @@ impl Batch {
     fn check(&self, worlds: impl IntoIterator<Item = usize>) -> Result<()> {
         let (count, mut last) = (self.members.len(), None);
         for world in worlds {
-            ensure(world < count, || format!("world {world}: there are {count}"))?;
+            ensure(world < count, || format!("world {world}: must be less than {count}"))?;
             ensure(last.is_none_or(|last| last < world), || format!("world {world}: worlds must be ascending"))?;
             last = Some(world);
         }

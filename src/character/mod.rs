@@ -8,9 +8,9 @@
 //! Three laws describe the legs:
 //! - A contact carries the character if the surface has a normal within the limit of slopes there, and if it is not
 //!   higher than a step above the feet. Steeper surfaces are walls for its walk.
-//! - After a walk the feet go down by up to a step, and what carries holds them. So the character stays on stairs,
+//! - After a walk the feet go down by up to a step, until a surface carries them. So the character stays on stairs,
 //!   slopes and edges.
-//! - If something stops the walk, the character tries the same walk from a step higher up, and takes the way that gets
+//! - If something stops the walk, the character tries the same walk from a step higher up, and takes the path that ends
 //!   nearer to its aim.
 
 mod nearest;
@@ -31,9 +31,9 @@ use surroundings::{Footing, Glide, Surroundings, Touch};
 /// caller may turn it between steps. The shapes of the body are convex. Lengths are relative to the body, so a
 /// character of any size moves alike.
 ///
-/// The character goes out of the way of kinematic bodies and stays on the body on which it stands, wherever that body
-/// takes it. It stops at other dynamic bodies and pushes them with a limited force. The same calls give the same bits
-/// for any number of threads. The value is the whole state: a copy of it belongs to a snapshot of the simulation.
+/// The character goes out of the way of kinematic bodies and stays on the body on which it stands, however that body
+/// moves. It stops at other dynamic bodies and pushes them with a limited force. The same calls give the same bits for
+/// any number of threads. The value is the whole state: a copy of it belongs to a snapshot of the simulation.
 ///
 /// ```
 /// use drystone::{Body, Character, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
@@ -110,9 +110,10 @@ pub struct Ground {
 pub struct Movement {
     /// Its translation in the step (m).
     pub translation: Vec3,
-    /// What it stands on at the end of the step, or `None` in the air and on slopes that are too steep.
+    /// The ground at the end of the step, or `None` in the air and on slopes that are too steep.
     pub ground: Option<Ground>,
-    /// What it touches at the end of the step, where kinematic bodies and the ground are then, sorted by index.
+    /// The contacts at the end of the step, with kinematic bodies and the ground at their poses of that time, sorted by
+    /// index.
     pub contacts: Vec<Hit>,
 }
 
@@ -132,7 +133,7 @@ impl Character {
         }
     }
 
-    /// What it stood on after the last call of [`Character::walk`].
+    /// The ground after the last call of [`Character::walk`].
     pub fn ground(&self) -> Option<Ground> {
         self.ground
     }
@@ -207,7 +208,7 @@ impl Character {
         let Some(ground) = self.ground else {
             return self.fly(around, start, self.drift, (walk, gravity), dt);
         };
-        // The ground takes it along, past all else.
+        // The ground carries it along, past all other obstacles.
         let carried = around.carried(start);
         let drift = carried / dt;
         let from = if carried == Vec3::ZERO {
@@ -260,8 +261,8 @@ impl Character {
         Walked { glide, ground, drift: ground.map_or(drift, |on| on.velocity), wanted: falling + walk }
     }
 
-    /// The forces on dynamic bodies in the next step (N), with their points: its weight on the ground, and a push on
-    /// what stops its walk.
+    /// The forces on dynamic bodies in the next step (N), with their points: the character's weight on the ground, and
+    /// a push on the bodies that stop its walk.
     fn pushes(&self, around: &Surroundings, walked: &Walked, gravity: Vec3, dt: f32) -> Vec<(BodyHandle, Vec3, Vec3)> {
         let touching = || walked.glide.touches.iter().filter(|touch| touch.is_near);
         let carries = |touch: &&Touch| {
@@ -283,13 +284,13 @@ impl Character {
     }
 
     fn check(&self, world: &World, velocity: Vec3) -> Result<()> {
-        let body = world.body(self.body).ok_or_else(|| input!("the body of the character is gone"))?;
+        let body = world.body(self.body).ok_or_else(|| input!("the body of the character was removed"))?;
         let name = world.name_of(self.body.index());
         ensure(body.kind == BodyKind::Kinematic, || format!("{name}: the body of a character must be kinematic"))?;
         let is_convex = body.solids().all(|collider| collider.shape.has_volume());
         let has_shapes = body.solids().next().is_some();
         ensure(has_shapes && is_convex, || {
-            format!("{name}: the body of a character needs shapes, and only convex ones")
+            format!("{name}: the body of a character must have shapes, all of them convex")
         })?;
         body.check().map_err(|error| error.within(&name))?;
         ensure((self.up.length() - 1.0).abs() < 1e-3, || format!("up = {}: must have length 1", self.up))?;

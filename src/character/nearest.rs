@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-12;
 const PARALLEL: f64 = 1e-6;
 
 impl HalfSpace {
-    /// How far a vector is outside.
+    /// Distance of a vector from the half-space, positive outside of it.
     fn beyond(&self, x: DVec3) -> f64 {
         self.least - self.normal.dot(x)
     }

@@ -1,4 +1,4 @@
-//! What is around a character in the next step, and how it moves among it.
+//! The surroundings of a character in the next step, and its motion among them.
 
 use glam::{DVec3, Quat, Vec3};
 use parry3d::bounding_volume::BoundingVolume;
@@ -19,10 +19,9 @@ const EXACT: f32 = 1e-3;
 const SLOPE: f32 = 1e-4;
 /// Largest number of pieces of one motion.
 const PIECES: u32 = 24;
-/// How much of a way out of an overlap is tried, one share after another. With nothing of it, every set of planes has a
-/// solution.
+/// Shares of the way out of an overlap, tried in this order. With a share of 0, every set of planes has a solution.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.0];
-/// Part of a vector that planes leave, up to which they hold it.
+/// Planes hold a unit vector if they leave less than this length of it.
 const HELD: f64 = 1e-3;
 
 /// A plane between the character and a collider near it.
@@ -37,18 +36,18 @@ pub(super) struct Touch {
 pub(super) struct Glide {
     /// Position of the body (m).
     pub at: Vec3,
-    /// What is near there.
+    /// The surfaces near there.
     pub touches: Vec<Touch>,
 }
 
-/// What carries the character.
+/// The surfaces that carry the character.
 #[derive(Clone, Copy)]
 pub(super) enum Footing {
     /// Surfaces up to a step above its feet.
     Feet,
     /// Surfaces up to a step above this height (m).
     Level(f32),
-    /// In the air: surfaces on which it would stand without legs.
+    /// In the air: surfaces that are level at the contact itself, without a step height.
     Air,
 }
 
@@ -174,7 +173,7 @@ impl<'a> Surroundings<'a> {
         if self.moves(body) { self.world.bodies[body.index()].velocity_at(touch.hit.point) } else { Vec3::ZERO }
     }
 
-    /// All that is nearer than `within` (m) to the character at a position, sorted by index.
+    /// All surfaces that are nearer than `within` (m) to the character at a position, sorted by index.
     fn touches(&self, at: Vec3, within: f32) -> Vec<Touch> {
         let mut touches = Vec::new();
         for own in self.own.solids() {
@@ -212,12 +211,12 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Moves by `by` past everything, to the place that is nearest to its aim.
+    /// Moves by `by` past all obstacles, to the place nearest to its aim.
     pub fn glide(&self, from: Vec3, by: Vec3, footing: Footing) -> Glide {
         self.travel(from, by, footing, false)
     }
 
-    /// Moves down by up to `by` (m), until something carries it.
+    /// Moves down by up to `by` (m), until a surface carries it.
     pub fn lower(&self, from: Vec3, by: f32, footing: Footing) -> Glide {
         self.travel(from, -by * self.up, footing, true)
     }
@@ -236,7 +235,8 @@ impl<'a> Surroundings<'a> {
         Glide { at, touches: self.touches(at, 2.0 * self.margin) }
     }
 
-    /// The vector nearest to `rest` that keeps the margin from everything. If `is_held`, it ends at what carries.
+    /// The vector nearest to `rest` that keeps the margin from everything. If `is_held`, it ends at surfaces that carry
+    /// the character.
     fn piece(&self, rest: Vec3, touches: &[Touch], (at, footing): (Vec3, Footing), is_held: bool) -> Vec3 {
         let (mut spaces, mut holds) = (Vec::new(), Vec::new());
         for touch in touches {
@@ -250,7 +250,7 @@ impl<'a> Surroundings<'a> {
             spaces.push(space);
             let across = self.across(normal).as_dvec3();
             if !carries && normal.dot(self.up) > 0.0 && across.length() > f64::from(SLOPE) {
-                // A wall where the slope is at this height.
+                // A wall at the place where the slope has this height.
                 let steepness = across.length();
                 spaces.push(HalfSpace { normal: across / steepness, least: space.least.min(0.0) / steepness });
             }
@@ -261,7 +261,7 @@ impl<'a> Surroundings<'a> {
             nearest(rest, &spaces.iter().map(eased).collect::<Vec<_>>())
         };
         let piece = SHARES.into_iter().find_map(out_of_overlap).unwrap_or(DVec3::ZERO);
-        // Rounding of nearly parallel planes enters nothing either.
+        // Rounding of nearly parallel planes must not cause an overlap either.
         let loose = spaces.iter().map(|space| (space, 0.1 * f64::from(self.exact)));
         let fixed = holds.iter().map(|space| (space, 0.0));
         let share = loose.chain(fixed).fold(1.0_f64, |share, (space, error)| {
@@ -271,7 +271,8 @@ impl<'a> Surroundings<'a> {
         (share * piece).as_vec3()
     }
 
-    /// What the character stands on: what carries it, or surfaces that hold it together. The velocity is zero here.
+    /// The ground: a surface that carries the character, or several surfaces that hold it together. The velocity in the
+    /// result is zero.
     pub fn stands(&self, glide: &Glide, footing: Footing) -> Option<Ground> {
         let level = |normal: Vec3| normal.dot(self.up);
         let near = || glide.touches.iter().filter(|touch| touch.is_near);

@@ -1,4 +1,4 @@
-//! How far a convex shape is apart from other shapes, and along which directions.
+//! Distances of a convex shape from other shapes, and the directions of these distances.
 
 use std::cell::RefCell;
 
@@ -30,7 +30,7 @@ thread_local! {
 }
 
 /// Calls `with` for each convex part of a shape (the whole of a convex one, each triangle of a mesh or height field)
-/// that is nearer than `within` (m) to a convex shape `moving`. Triangles come in an order that the mesh decides.
+/// that is nearer than `within` (m) to a convex shape `moving`. The mesh determines the order of triangles.
 pub(crate) fn clearances(
     (fixed, pose): (&Shape, &Pose),
     (moving, own): (&Shape, &Pose),

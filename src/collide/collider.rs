@@ -38,7 +38,6 @@ pub(super) struct ColliderInfo {
     pub reach: f32,
     /// Whether it is a half-space, which has no box for the tree.
     pub unbounded: bool,
-    /// Whether it is a sensor.
     pub sensor: bool,
     /// Its own material.
     pub material: Option<Material>,

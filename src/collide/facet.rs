@@ -38,8 +38,8 @@ pub(super) fn half_space_contact(
     Some(())
 }
 
-/// The contacts of a mesh or height field with a convex shape at `pos12`: one for each triangle, in an order that the
-/// mesh decides.
+/// The contacts of a mesh or height field with a convex shape at `pos12`, one for each triangle. The mesh determines
+/// their order.
 pub(super) fn composite_contacts(
     composite: &dyn Shape,
     shape: &dyn Shape,

@@ -115,7 +115,6 @@ impl Manifold {
         self.count = count as u8;
     }
 
-    /// Whether it has ended.
     pub(crate) fn has_ended(&self) -> bool {
         self.count == 0
     }

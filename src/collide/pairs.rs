@@ -150,7 +150,6 @@ impl Pairs {
         (track.predicted != NEVER).then_some(&track.then)
     }
 
-    /// All, in chunks.
     pub fn par_chunks_mut(&mut self) -> impl IndexedParallelIterator<Item = PairChunk<'_>> {
         let chunks = self.all.par_chunks_mut(PAIRS_A_TASK).zip(self.tracks.par_chunks_mut(PAIRS_A_TASK)).enumerate();
         chunks.map(|(chunk, (pairs, tracks))| PairChunk { first: (chunk * PAIRS_A_TASK) as u32, pairs, tracks })

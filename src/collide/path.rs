@@ -24,7 +24,7 @@ const MOST_TURN: f32 = 0.5;
 /// Bound of the angular acceleration of a free body, divided by the square of its spin. The moments of inertia about
 /// two axes differ by no more than the third moment, so no coefficient in Euler's three equations exceeds 1.
 const SWERVE: f32 = 0.58;
-/// Gap up to which surfaces touch, relative to the same.
+/// Gap up to which surfaces touch, relative to the same half extent.
 const TOUCHING: f32 = 2e-3;
 
 /// The predicted distance of a pair that the next step computes in any case.

@@ -183,13 +183,13 @@ pub(super) enum Until {
 /// Tolerance of a distance, relative to the smallest half extent of the thinner shape.
 const NEAR: f32 = 1e-3;
 /// Depth of a touching shape at which it is held, and the largest additional depth of a held shape in one step,
-/// relative to the same.
+/// relative to the same half extent.
 const HELD: f32 = 0.2;
 const DEEPER: f32 = 0.002;
-/// Depth from which the shape did not get there by passing through: walls press it, or it began there. It is not held,
-/// and turns as it comes out. Relative to the same.
+/// Depth, relative to the same half extent, from which a shape is not held. It did not get there by passing through:
+/// walls press it, or it started there. It turns as it comes out.
 const STUCK: f32 = 0.35;
-/// Largest depth at which a shape is held, relative to the same.
+/// Largest depth at which a shape is held, relative to the same half extent.
 const DEEPEST: f32 = 0.9;
 /// Largest number of pieces of a path.
 const PIECES: usize = 256;
@@ -215,7 +215,7 @@ impl Until {
     }
 }
 
-/// The time of impact of two shapes, of which at most one is a mesh or height field. `size` sets the tolerance of
+/// The time of impact of two shapes. At most one of them is a mesh or height field. `size` sets the tolerance of
 /// lengths: half of the smallest side of the moving shape. If `is_one_sided`, only those sides of meshes and height
 /// fields count that face the center of the other body at the start of the step.
 pub(super) fn impact(a: Swept, b: Swept, size: f32, until: Until, is_one_sided: bool) -> Option<Impact> {

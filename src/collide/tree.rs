@@ -19,7 +19,7 @@ const WIDTH: usize = 4;
 const ALONE: usize = 3;
 /// If leaves stretch to more than this multiple of their length at the last arrangement, the boxes are arranged again.
 const STRETCH: f32 = 1.2;
-/// Largest weight of one leaf: a box that flew far away says nothing about the others.
+/// Largest weight of one leaf: a box that flew far away does not represent the others.
 const MOST_STRETCH: f32 = 16.0;
 /// Capacity of the search stack: three nodes of each level above the leaves (15 levels for 2^32 boxes), and one more.
 const WAITING: usize = 64;

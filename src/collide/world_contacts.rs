@@ -68,7 +68,6 @@ pub(super) struct WorldContacts {
     pub(super) tree: Tree,
     /// The half-spaces, without sensors.
     pub(super) planes: Vec<Plane>,
-    /// The sensors.
     pub(super) sensors: Vec<u32>,
     /// Memory of [`WorldContacts::sense`].
     pub(super) strayed: Vec<u32>,
@@ -202,8 +201,8 @@ impl WorldContacts {
         self.narrow_phase(input, parted)
     }
 
-    /// Asks `filter` for the pairs of a body that is awake or moves; the others keep their answers. Without a filter
-    /// all pairs may touch. Adds those that may not to `refused`.
+    /// Asks `filter` about every pair with an awake or moving body. The other pairs keep their answers. Without a
+    /// filter all pairs may touch. Adds refused pairs to `refused`.
     pub fn filter(
         &mut self,
         moving: &[BodyState],

@@ -1,4 +1,4 @@
-//! Every choice of the solver, in one plain struct. Feature `serde` reads and writes it.
+//! All settings of the solver in one plain struct. The feature `serde` reads and writes it.
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -41,48 +41,51 @@ pub use rules::{
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub struct SolverConfig {
-    /// Substeps of one step, 1 or more: the least that an island takes. Errors fall with their square, time grows with them.
+    /// Substeps of one step, 1 or more: the smallest number that an island takes. Errors fall with the square of this
+    /// number, and time grows with it.
     pub substeps: u32,
-    /// Most substeps that an island takes. Its contacts keep the promise of `max_penetration` and `max_penetration_share` by twice,
-    /// four times, ... `substeps`, as few as do; `substeps` or less gives all islands the same. Accelerated sweeps, and sweeps that end
-    /// by a tolerance, go over all islands together, which then take `substeps`.
+    /// Largest number of substeps that an island takes. An island takes `substeps`, twice, four times, ... that number:
+    /// the fewest that keep its contacts within `max_penetration` and `max_penetration_share`. If this is `substeps` or
+    /// less, all islands take the same number. Accelerated sweeps, and sweeps that end by a tolerance, process all
+    /// islands together, and all islands then take `substeps`.
     pub max_substeps: u32,
-    /// Deepest that a contact sags under a lasting load before its preload lifts it (m); 0 leaves it to `max_penetration_share`.
+    /// Deepest overlap of a contact under a lasting load, before its preload lifts it (m); 0 leaves the limit to
+    /// `max_penetration_share`.
     pub max_penetration: f32,
-    /// The same, relative to the smallest half extent of the thinner shape; the lower one counts.
+    /// The same limit, relative to the smallest half extent of the thinner shape; the lower limit counts.
     pub max_penetration_share: f32,
-    /// Biased sweeps a substep, 1 or more.
+    /// Biased sweeps in a substep, 1 or more.
     pub iterations: u32,
-    /// Sweeps without bias a substep, after the positions moved: they take out the velocity that the bias put in.
+    /// Sweeps without bias in a substep, after the positions have moved. They remove the velocity that the bias added.
     pub relax: u32,
-    /// How these sweeps follow each other.
+    /// How the sweeps of a substep follow each other.
     pub method: Method,
     /// How overlap is removed.
     pub stabilization: Stabilization,
     /// Share of the overlap that Baumgarte stabilization removes in a substep, 0 to 1.
     pub baumgarte: f32,
-    /// Overlap that Baumgarte stabilization leaves alone (m).
+    /// Overlap that Baumgarte stabilization does not remove (m).
     pub slop: f32,
-    /// Every correction is multiplied by this: under-relaxed below 1, over-relaxed up to 2. 1 is safe everywhere.
+    /// Factor on every correction: under-relaxation below 1, over-relaxation up to 2. 1 is safe everywhere.
     pub relaxation: f32,
-    /// Sweeps of a substep end when no correction changes a relative velocity by more than this (m/s); 0 sweeps on.
-    /// `iterations` and `relax` are then the most that are done.
+    /// The sweeps of a substep end when no correction changes a relative velocity by more than this (m/s); 0 never ends
+    /// them early. `iterations` and `relax` are then the largest numbers of sweeps.
     pub tolerance: f32,
-    /// Contact stiffness: frequency of the undamped contact spring times the substep length, so that it is 60 Hz for
-    /// 8 substeps at 60 steps a second. More sinks less (as its square) and rattles more. Measured with 8 substeps, rms speed
-    /// at rest and mean overlap of a pyramid of 325 boxes without preload: 0.125 gives 0.02 mm/s and 0.51 mm, 0.1875 gives
-    /// 0.02 mm/s and 0.23 mm, 0.25 gives 52 mm/s; but 1 under 1000 already rattles at 0.1875. Source: Catto, "Solver2D", 2024;
-    /// the factor of Box2D 3.1.
+    /// Contact stiffness: the frequency of the undamped contact spring times the substep length. The default 0.125 is
+    /// 60 Hz with 8 substeps at 60 steps a second. A higher value reduces the overlap (as its square), but bodies
+    /// rattle more. Measured with 8 substeps on a pyramid of 325 boxes without preload, rms speed at rest and mean
+    /// overlap: 0.125 gives 0.02 mm/s and 0.51 mm, 0.1875 gives 0.02 mm/s and 0.23 mm, 0.25 gives 52 mm/s. A box under
+    /// 1000 times its mass already rattles at 0.1875. Source: Catto, "Solver2D", 2024; the factor of Box2D 3.1.
     pub contact_frequency: f32,
     /// Damping ratio of the contact spring.
     pub contact_damping: f32,
-    /// Frequency of contacts with fixed and kinematic bodies, relative to the others.
+    /// Frequency of the springs of contacts with fixed and kinematic bodies, relative to that of other contacts.
     pub fixed_contact_frequency_ratio: f32,
-    /// How fast the overlap of soft contacts at rest is taken out, as a rate (1/s): a contact that bears a load is preloaded by
-    /// the overlap that the load would make. 0 leaves it there. Measured with 8 substeps, deepest overlap of a wall of 400 bricks:
-    /// 2.57 mm without, 0.11 mm with, at the same speed at rest and drift.
+    /// Rate at which the overlap of soft contacts at rest is removed (1/s); 0 leaves the overlap. The preload of a
+    /// loaded contact is the overlap that the load would cause. Measured with 8 substeps, deepest overlap of a wall of
+    /// 400 bricks: 2.57 mm without and 0.11 mm with preload, at the same speed at rest and the same drift.
     pub preload_rate: f32,
-    /// Fastest that overlap is pushed out (m/s).
+    /// Largest speed at which overlap is pushed out (m/s).
     pub push_limit: f32,
     /// Friction rule.
     pub friction: Friction,
@@ -90,12 +93,13 @@ pub struct SolverConfig {
     pub friction_at: FrictionAt,
     /// Which sweeps solve friction.
     pub friction_sweeps: FrictionSweeps,
-    /// Largest gap of a joint, relative to its arms. Nets that sweeps would leave further apart take more substeps, and so do joints whose arms turn
-    /// fast.
+    /// Largest gap of a joint, relative to its arms. If sweeps would leave a larger gap in a net, the net takes more
+    /// substeps. Joints whose arms rotate fast also take more substeps.
     pub max_joint_gap_share: f32,
-    /// How joints are solved. `auto` solves all joints of a connected set of bodies at once where that costs time in proportion to their number, as
-    /// in chains, trees and single loops. It sweeps nets. Motors and springs are swept all the same. Measured with 8 substeps, a chain of 100 links
-    /// with 1000 times the mass of a link at its end: gap 0.22 of a link with sweeps, 6e-5 at once.
+    /// How joints are solved. `auto` solves all joints of a connected set of bodies at once if that takes time in
+    /// proportion to their number, as in chains, trees and single loops. It sweeps nets. Motors and springs are always
+    /// swept. Measured with 8 substeps on a chain of 100 links with 1000 times the mass of a link at its end: the gap
+    /// is 0.22 of a link with sweeps, and 6e-5 of a link at once.
     pub joint_solver: JointSolver,
     /// Joint stiffness: frequency of the undamped joint spring times the substep length.
     pub joint_frequency: f32,
@@ -103,29 +107,33 @@ pub struct SolverConfig {
     pub joint_damping: f32,
     /// Whether a step starts from the impulses of the step before.
     pub warm_start: bool,
-    /// Approach slower than this does not bounce (m/s).
+    /// Approach speed below which bodies do not bounce (m/s).
     pub restitution_threshold: f32,
-    /// Whether free rotation of unequal moments of inertia is integrated (implicit midpoint).
+    /// Whether the gyroscopic torque of unequal moments of inertia is integrated (implicit midpoint).
     pub gyroscopic: bool,
-    /// How far apart surfaces are when a contact is already made, relative to the smallest half extent of the thinner
-    /// shape. The distance that the bodies approach in one step is added, up to twice that half extent; before a half-space, all of it.
-    /// Bodies that approach further, or pass beside each other, have the contact of the place where their ways meet, and none where the ways do not.
+    /// Distance of two surfaces at which they already have a contact, relative to the smallest half extent of the
+    /// thinner shape. The distance that the bodies approach in one step is added: up to twice that half extent, or all
+    /// of it before a half-space. Bodies that approach further, or pass beside each other, get the contact at the place
+    /// where their paths meet, and no contact if the paths do not meet.
     pub speculative_margin: f32,
-    /// A manifold is reused while its bodies moved relative to each other by less than this, relative to the smallest
-    /// half extent of the thinner shape; 0 computes every manifold anew.
+    /// Relative displacement of two bodies below which their manifold is reused, relative to the smallest half extent
+    /// of the thinner shape; 0 computes every manifold anew.
     pub recycle_distance: f32,
-    /// Bodies that touch or are joined fall asleep together once all of them were slower than `sleep_speed` for this long (s);
-    /// 0 lets nothing sleep. Asleep they cost next to nothing and stay to the last bit, until something disturbs them.
+    /// Time for which bodies that touch or are joined have to be slower than `sleep_speed` before they fall asleep
+    /// together (s); 0 lets no body sleep. Sleeping bodies cost next to nothing and keep every bit of their state until
+    /// something disturbs them.
     pub sleep_after: f32,
-    /// Speed of the fastest point of a body under which it is slow (m/s). A pile of 5,000 falls asleep 7 s after it came to rest,
-    /// with a mean overlap of 0.166 mm where it has 0.161 awake; at 5 mm/s a few that rattle keep it awake.
+    /// Speed of the fastest point of a body below which the body is slow (m/s). A pile of 5,000 falls asleep 7 s after
+    /// it came to rest, with a mean overlap of 0.166 mm instead of 0.161 mm awake. At 5 mm/s a few rattling bodies keep
+    /// it awake.
     pub sleep_speed: f32,
-    /// Colors smaller than this are swept one after another in one workgroup instead of one dispatch each.
+    /// Colors with fewer constraints than this are swept one after another in one workgroup, instead of one dispatch
+    /// each.
     pub fuse_colors_below: u32,
-    /// Colors for contacts between bodies that can move, 1 to 64. A contact that finds none is solved sequentially
-    /// and counted as overflow.
+    /// Colors for contacts between movable bodies, 1 to 64. A contact without a color is solved sequentially and
+    /// counted as overflow.
     pub max_colors: u32,
-    /// Rules that exist for comparison.
+    /// Rules for comparison.
     pub rules: ComparisonRules,
 }
 
@@ -166,18 +174,18 @@ crate::saved::fields!(SolverConfig {
     rules,
 });
 
-/// Colors smaller than this share a workgroup, unless told otherwise.
+/// Default of [`SolverConfig::fuse_colors_below`].
 pub const FUSE_BELOW: u32 = 256;
 
-/// Shortest step (s). Shorter ones move nothing that single precision can tell from rest.
+/// Shortest step (s). In a shorter step, no motion can be distinguished from rest in single precision.
 pub const SHORTEST_STEP: f32 = 1e-9;
 /// Longest step (s).
 pub const LONGEST_STEP: f32 = 1.0;
 
-/// Refuses a length of a step that no step can be made of: less than [`SHORTEST_STEP`], more than [`LONGEST_STEP`], or no number.
+/// Refuses a step length outside of [`SHORTEST_STEP`] to [`LONGEST_STEP`], or NaN.
 ///
 /// # Errors
-/// One line with the length and the range.
+/// One line has the length and the range.
 pub fn check_step_length(dt: f32) -> Result<()> {
     let message = || format!("dt = {dt}: must be {SHORTEST_STEP:e} to {LONGEST_STEP} seconds");
     ensure((SHORTEST_STEP..=LONGEST_STEP).contains(&dt), message)
@@ -225,7 +233,8 @@ impl Default for SolverConfig {
 }
 
 impl SolverConfig {
-    /// These settings with some changed. Settings grow with versions, so that a program changes them instead of listing them.
+    /// These settings with some changes. A later version can have more settings, so a program changes single settings
+    /// and does not list all.
     ///
     /// ```
     /// let config = drystone::SolverConfig::default().with(|c| c.substeps = 32);
@@ -236,7 +245,7 @@ impl SolverConfig {
         self
     }
 
-    /// The same settings, but nothing falls asleep: for whatever is measured or compared.
+    /// The same settings without sleep, for measurements and comparisons.
     ///
     /// ```
     /// assert_eq!(drystone::SolverConfig::default().without_sleep().sleep_after, 0.0);
@@ -245,13 +254,14 @@ impl SolverConfig {
         Self { sleep_after: 0.0, ..self }
     }
 
-    /// Deepest that a contact may sag under a lasting load (m); `size` is the smallest half extent of the thinner shape (m).
+    /// Deepest overlap that a contact may have under a lasting load (m). `size` is the smallest half extent of the
+    /// thinner shape (m).
     pub fn promised_sag(&self, size: f32) -> f32 {
         let share = self.max_penetration_share * size;
         if self.max_penetration > 0.0 { share.min(self.max_penetration) } else { share }
     }
 
-    /// The friction rule that these settings come to.
+    /// The friction rule that these settings select.
     pub fn friction_rule(&self) -> FrictionRule {
         match self.friction {
             Friction::None => FrictionRule::None,
@@ -261,10 +271,10 @@ impl SolverConfig {
         }
     }
 
-    /// Refuses values that no step can be made of, and settings that contradict each other.
+    /// Refuses values that no step can use, and settings that contradict each other.
     ///
     /// # Errors
-    /// One line that names the settings, their values and what to do.
+    /// One line names the settings, their values and a remedy.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         let (rule, relax) = (self.stabilization, self.relax);
@@ -285,10 +295,10 @@ impl SolverConfig {
         Ok(())
     }
 
-    /// Refuses values out of their range, one by one, whether or not they contradict each other.
+    /// Refuses values out of their ranges, even if the settings contradict each other.
     ///
     /// # Errors
-    /// One line that names the setting, its value and the range.
+    /// One line names the setting, its value and the range.
     pub fn check_ranges(&self) -> Result<()> {
         let tolerance = self.tolerance;
         ensure(!(tolerance > 0.0 && self.iterations == 0), || {

@@ -1,4 +1,4 @@
-//! The kinds of settings, and the rules that exist for comparison.
+//! Values of settings, and rules for comparison.
 
 #[cfg(feature = "schema")]
 use schemars::JsonSchema;
@@ -33,7 +33,8 @@ pub enum Friction {
 
 kinds!(Friction { None, Box, Disc });
 
-/// The friction rule that a kernel applies: one of [`Friction`], or the rule for comparison [`ComparisonRules::slip_friction`].
+/// The friction rule that a kernel applies: one of [`Friction`], or the rule for comparison
+/// [`ComparisonRules::slip_friction`].
 ///
 /// ```
 /// use drystone::{SolverConfig, config::FrictionRule};
@@ -70,8 +71,8 @@ pub enum FrictionAt {
     /// At every contact point, limited by that point's normal impulse.
     #[default]
     Points,
-    /// Once per manifold: at the middle of its points and as a twist about the normal, limited by the sum of its normal impulses.
-    /// Cheaper.
+    /// Once per manifold: at the middle of its points, and as a torque about the normal. The limit is the sum of its
+    /// normal impulses. Cheaper.
     Manifold,
 }
 
@@ -79,8 +80,9 @@ kinds!(FrictionAt { Points, Manifold });
 
 /// Order of normals and friction within a manifold.
 ///
-/// Over the standing scenes, overlap and speed at rest of both orders agree to a few percent. Towers drift a little less with
-/// normals first (zigzag of 20: 33 against 38 mm in 10 s), walls with friction first (3.4 against 5.7 mm).
+/// In the standing scenes, both orders agree in overlap and speed at rest to a few percent. Towers drift a little less
+/// with normals first (zigzag of 20: 33 mm instead of 38 mm in 10 s), and walls with friction first (3.4 mm instead of
+/// 5.7 mm).
 ///
 /// ```
 /// use drystone::{SolverConfig, config::FrictionOrder};
@@ -116,10 +118,10 @@ kinds!(FrictionOrder { NormalsFirst, FrictionFirst });
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum Clamping {
-    /// Every single correction; impulses start at zero in each substep. No later correction can take back one that pushed too
-    /// far: misaligned stacks fall.
+    /// Every single correction. Impulses start at zero in each substep, and no later correction can reduce an earlier
+    /// one that was too large: misaligned stacks fall.
     PerCorrection,
-    /// The sum of the corrections.
+    /// The sum of all corrections.
     #[default]
     Accumulated,
 }
@@ -141,7 +143,8 @@ kinds!(Clamping { PerCorrection, Accumulated });
 pub enum Stabilization {
     /// Not at all: overlap grows.
     None,
-    /// By a target velocity, a share of the overlap a substep (Baumgarte), beyond a slop and up to a limit.
+    /// By a target velocity that removes a share of the overlap in each substep (Baumgarte), above a slop and up to a
+    /// speed limit.
     Baumgarte,
     /// By a damped spring, integrated implicitly; relax sweeps remove the velocity of the spring.
     #[default]
@@ -165,12 +168,12 @@ named!(Stabilization { None = "none", Baumgarte = "baumgarte", Soft = "soft", })
 #[cfg_attr(feature = "schema", derive(JsonSchema))]
 #[non_exhaustive]
 pub enum JointSolver {
-    /// At once where factors stay sparse, else by sweeps.
+    /// At once if the factors stay sparse, else by sweeps.
     #[default]
     Auto,
-    /// One after another, as contacts.
+    /// One after another, like contacts.
     Sweeps,
-    /// All joints of a connected set of bodies at once, whatever that costs; motors and springs by sweeps.
+    /// All joints of a connected set of bodies at once, at any cost; motors and springs by sweeps.
     Direct,
 }
 
@@ -193,7 +196,7 @@ named!(JointSolver { Auto = "auto", Sweeps = "sweeps", Direct = "direct", });
 pub enum FrictionSweeps {
     /// The biased sweeps and the relax sweeps.
     All,
-    /// The relax sweeps only: the push-out of the biased sweeps then drags no body along.
+    /// The relax sweeps only. The push-out of the biased sweeps then drags no body along.
     #[default]
     Relax,
 }
@@ -216,8 +219,8 @@ pub enum Method {
     /// One after another: projected Gauss-Seidel.
     #[default]
     Plain,
-    /// With Nesterov's momentum, and a restart as soon as steps grow. The first two sweeps are plain ones, so three sweeps are the
-    /// fewest that gain anything.
+    /// With Nesterov's momentum, and a restart as soon as steps grow. The first two sweeps are plain, so at least three
+    /// sweeps are needed for a gain.
     Accelerated,
 }
 
@@ -225,7 +228,7 @@ kinds!(Method { Plain, Accelerated });
 
 named!(Method { Plain = "plain", Accelerated = "accelerated", });
 
-/// Rules that exist for comparison with the literature (docs/rules.md). No scene needs another value than the default.
+/// Rules for comparison with the literature (docs/rules.md). No scene needs a value other than the default.
 ///
 /// ```
 /// use drystone::{SolverConfig, config::{Clamping, ComparisonRules}};
@@ -241,12 +244,13 @@ named!(Method { Plain = "plain", Accelerated = "accelerated", });
 pub struct ComparisonRules {
     /// Order of normals and friction within a manifold.
     pub friction_order: FrictionOrder,
-    /// Whether friction at a point has one direction only, that of its slip when the step begins; a body at rest then creeps.
-    /// It replaces the rules box and disc.
+    /// Whether friction at a point acts in one direction only, that of its slip at the start of the step; a body at
+    /// rest then creeps. It replaces the rules box and disc.
     pub slip_friction: bool,
     /// Impulse that is kept non-negative: the sum of the corrections, or each correction.
     pub clamping: Clamping,
-    /// How often a sweep visits a manifold before the next manifold, 1 to 16. With 2, fewer but longer sweeps are needed.
+    /// Number of times that a sweep visits a manifold before the next manifold, 1 to 16. With 2, fewer but longer
+    /// sweeps are needed.
     pub manifold_passes: u8,
 }
 

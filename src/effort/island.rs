@@ -2,20 +2,20 @@
 
 use crate::stats::EFFORT_CLASSES;
 
-/// What decides the class of an island.
+/// The facts that decide the class of an island.
 #[derive(Clone, Copy, Debug)]
 pub struct Island {
     /// The largest need of its contacts.
     pub largest_need: f32,
-    /// What its bodies and the drives of its joints can be as a load (N).
+    /// The largest load that its bodies and the drives of its joints can cause (N).
     pub load: f32,
-    /// The largest need of its joints, and of restless bodies: no other contact takes load from them.
+    /// The largest need of its joints and of restless bodies. It is not shared among contacts.
     pub whole_need: f32,
     pub contacts: u32,
     pub bodies: u32,
     /// The speed of its fastest body (m/s).
     pub fastest: f32,
-    /// The highest class of its bodies, and the fewest steps for which any was calm.
+    /// The highest class of its bodies, and the fewest calm steps of any.
     pub class: u8,
     pub calm_for: u8,
 }
@@ -33,15 +33,16 @@ impl Island {
         calm_for: u8::MAX,
     };
 
-    /// The need that counts. A column hands its load on through one contact a body, and sways where that contact is soft. Where a body has several
-    /// contacts, the load has as many ways, and so has what is left of it where one of them gives way.
+    /// The need of the contacts that counts. A column passes its load on through one contact for each body, and sways
+    /// if this contact is soft. If each body has several contacts, the load has several ways, and the others remain
+    /// when one yields.
     fn counted(&self) -> f32 {
         let ways = (self.bodies as f32 / self.contacts.max(1) as f32).min(1.0);
         self.largest_need * ways * ways
     }
 
-    /// The next class, and for how many steps the island has been calm. `highest` is the highest class that the settings allow; above class
-    /// `long_from` fewer steps suffice.
+    /// The next class, and the number of calm steps so far. `highest` is the highest class that the settings allow.
+    /// Above the class `long_from`, fewer steps suffice.
     pub fn next(&self, highest: u8, long_from: u8) -> (u8, u8) {
         let class = self.class.min(highest);
         let need = self.counted().max(self.whole_need);
@@ -49,7 +50,7 @@ impl Island {
         if wanted >= class {
             return (wanted, 0);
         }
-        // The same number of substeps in each of the classes from `long_from` on.
+        // From `long_from` on, every class waits for the same number of substeps.
         let calm = u32::from(self.calm_for) + (1 << class.saturating_sub(long_from));
         match need > CALM_SHARE * sag_factor(class - 1) {
             true => (class, 0),
@@ -59,9 +60,9 @@ impl Island {
     }
 }
 
-/// Steps after which an island goes down one class, up to the class from which on fewer suffice; half as many from each class above.
+/// Calm steps after which an island goes down one class, up to `long_from`. Each class above halves the number.
 const CALM_STEPS: u32 = 60;
-/// The share of the promise that the lower class has to keep.
+/// The share of the promise that the next lower class has to keep.
 const CALM_SHARE: f32 = 0.5;
 /// The highest class of all.
 pub const HIGHEST: u8 = EFFORT_CLASSES as u8 - 1;
@@ -71,7 +72,7 @@ fn class_for(need: f32) -> u8 {
     (0..HIGHEST).find(|&class| need <= sag_factor(class)).unwrap_or(HIGHEST)
 }
 
-/// How much deeper a contact would sag in class 0 than in this class.
+/// The sag of a contact in class 0 over its sag in this class.
 fn sag_factor(class: u8) -> f32 {
     (1_u32 << (2 * class)) as f32
 }

@@ -103,7 +103,7 @@ pub(super) fn add_work_of_drives(
                 let pull = problem.joint_impulse(&problem.joint_totals, row as usize);
                 let twist = problem.axis_impulse(&problem.joint_totals, row as usize, false);
                 let velocity = driver.linear_velocity + driver.angular_velocity.cross(Vec3::from(arm));
-                // The driver gives what the joint takes from it.
+                // The driver supplies the energy that the joint takes from it.
                 work -= sign * f64::from(velocity.dot(pull) + driver.angular_velocity.dot(twist));
             }
         }
@@ -186,8 +186,8 @@ fn work_of_contact(driver: &Body, contact: &ContactRow, is_a: bool, problem: &St
     work
 }
 
-/// Energy that the springs of a contact held at the start of the step, and that they hold now (J): m (w s)²/2 at the
-/// overlap s, as far as `push_limit` lets them push.
+/// Energy of the springs of a contact at the start of the step, and now (J): m v²/2 with v = w s at the overlap s, at
+/// most `push_limit`.
 pub(super) fn held_by_contact(problem: &StepProblem, contact: &ContactRow, substep: &Substep) -> [f64; 2] {
     let both = can_move(problem, contact.body_a) && can_move(problem, contact.body_b);
     let softness = if both { substep.movable } else { substep.fixed };

@@ -1,31 +1,31 @@
-//! One axis of a joint: body a is held, limited or driven along it or about it. Doubles of `shaders/lib/axes.wgsl`.
+//! One axis of a joint, along which or about which body a is held, limited or driven. Twins of `shaders/lib/axes.wgsl`.
 
 use super::Rules;
 use super::pair::{note_correction, relative_movement};
 use super::rows::{Axis, Joint, Pair, StepParams};
 use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, smaller, turned, vec3};
 
-/// How bodies move along an axis: double of the WGSL struct `AxisMotion`.
+/// Motion of the bodies along an axis. Twin of the WGSL struct `AxisMotion`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AxisMotion<L> {
-    /// Along which the bodies shift; zero for an axis to turn about.
+    /// The direction in which the bodies shift; zero for an axis to turn about.
     pub along: Vec3<L>,
-    /// About which a turns.
+    /// The axis about which a turns.
     pub about_a: Vec3<L>,
-    /// About which b turns.
+    /// The axis about which b turns.
     pub about_b: Vec3<L>,
-    /// How far a moved against b since the step began.
+    /// Movement of a against b since the step began.
     pub moved: L,
 }
 
-/// Component by component.
+/// Selects each component.
 #[inline(always)]
 pub(super) fn select3<L: Lane>(if_false: Vec3<L>, if_true: Vec3<L>, mask: L::Mask) -> Vec3<L> {
     let select = L::select;
     vec3(select(if_false.x, if_true.x, mask), select(if_false.y, if_true.y, mask), select(if_false.z, if_true.z, mask))
 }
 
-/// The vector by which a turned against b since the step began, to 3e-4 at 1 rad.
+/// The rotation vector of a against b since the step began, to 3e-4 at 1 rad.
 #[inline(always)]
 pub fn relative_turn<L: Lane>(pair: &Pair<L>) -> Vec3<L> {
     let q = quat_mul(pair.a.dq, conjugate(pair.b.dq));
@@ -37,27 +37,27 @@ pub fn relative_turn<L: Lane>(pair: &Pair<L>) -> Vec3<L> {
 /// Distances below the root of this have no direction (m²).
 const LEAST_SQUARE: f64 = 1e-12;
 
-/// The direction of the anchors, and how much longer their distance is than when the step began, where the anchor of a shifted. Without a
-/// length the direction is the one that b carried.
+/// The direction between the anchors, and the growth of their distance since the step began, after a shift of the
+/// anchor of a. Without a length the direction is the carried one.
 #[inline(always)]
 fn along_anchors<L: Lane>(carried: Vec3<L>, shift: Vec3<L>, length: L) -> (Vec3<L>, L) {
     let apart = carried * length + shift;
     let square = dot3(apart, apart);
     let has_direction = L::and(length.gt(L::constant(0.0)), square.gt(L::constant(LEAST_SQUARE)));
     let now = select3(carried, apart * square.inverse_sqrt(), has_direction);
-    // Without the cancellation of a difference of two lengths, unless the anchors passed each other.
+    // This form avoids the cancellation of a difference of two lengths, unless the anchors passed each other.
     let cosine = dot3(carried, now);
     let longer = dot3(carried + now, shift) * reciprocal(L::constant(1.0) + cosine);
     (now, L::select(square * square.inverse_sqrt() - length, longer, cosine.gt(L::constant(0.0))))
 }
 
-/// The axis now: as it was when the step began, turned with b; that of a distance follows the anchors.
+/// The present axis. It turned with b since the step began. The axis of a distance follows the anchors.
 #[inline(always)]
 pub fn axis_motion<L: Lane>(pair: &Pair<L>, joint: &Joint<L>, axis: &Axis<L>) -> AxisMotion<L> {
     let zero = L::constant(0.0);
     let is_linear = axis.is_linear.gt(zero);
     let carried = axis.direction + turned(pair.b.dq, axis.direction);
-    // The anchor of a, as seen from the point of b that was there when the step began.
+    // The anchor of a relative to the point of b that was at the same place when the step began.
     let shift = -relative_movement(pair, joint.r_a, joint.r_b);
     let (now, distance) = along_anchors(carried, shift, axis.length);
     let arm_a = joint.r_a + turned(pair.a.dq, joint.r_a);
@@ -71,7 +71,7 @@ pub fn axis_motion<L: Lane>(pair: &Pair<L>, joint: &Joint<L>, axis: &Axis<L>) ->
     }
 }
 
-/// How fast a moves against b.
+/// Speed of a against b.
 #[inline(always)]
 pub fn axis_speed<L: Lane>(rules: Rules, pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
     let u = dot3(motion.along, pair.a.v - pair.b.v) + (dot3(motion.about_a, pair.a.w) - dot3(motion.about_b, pair.b.w));
@@ -99,14 +99,14 @@ pub fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
     dot3(motion.along, motion.along) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + (turn_a + turn_b)
 }
 
-/// Applies the impulse that an axis already carries. Kernel `warm_start_joints`.
+/// Applies the carried impulse of an axis. Kernel `warm_start_joints`.
 #[inline(always)]
 pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, axis: &Axis<L>, impulse: L) {
     let motion = axis_motion(pair, joint, axis);
     apply_axis_impulse(pair, &motion, impulse);
 }
 
-/// Rows that are no limits are further than this above their upper limit (m, rad): half of `NO_LIMIT`.
+/// Rows that are no limits are more than this above their upper limit (m, rad). It is half of `NO_LIMIT`.
 const LEAST_LEFT: f64 = -5e17;
 
 /// Whether a row is a lock: neither a limit nor a drive.
@@ -116,13 +116,13 @@ pub fn is_lock<L: Lane>(axis: &Axis<L>) -> L::Mask {
     L::and(L::constant(LEAST_LEFT).gt(axis.left), L::constant(0.5).gt(of_drive))
 }
 
-/// Where the nearer of the two limits of an axis is.
+/// Position relative to the nearer of the two limits of an axis.
 #[derive(Clone, Copy)]
 pub(super) struct NearerLimit<L: Lane> {
-    /// Whether the row is a limit, and whether the upper one is nearer.
+    /// Whether the row is a limit, and whether the upper limit is nearer.
     pub is_limit: L::Mask,
     pub is_upper: L::Mask,
-    /// The way that is left to it; below zero beyond it. Of a lock, its place.
+    /// Distance to the limit, negative beyond it. For a lock, its position.
     pub gap: L,
     /// Whether the limit is not reached.
     pub apart: L::Mask,
@@ -139,7 +139,7 @@ impl<L: Lane> NearerLimit<L> {
     }
 }
 
-/// Sweeps one axis; with `but_locks` only if it is no lock. Kernels `solve_joints` and `solve_axes`.
+/// Sweeps one axis. With `but_locks` it leaves out locks. Kernels `solve_joints` and `solve_axes`.
 #[inline(always)]
 pub fn solve_axis<L: Lane>(
     rules: Rules,
@@ -154,11 +154,12 @@ pub fn solve_axis<L: Lane>(
     let motion = axis_motion(pair, joint, axis);
     let mass = reciprocal(axis_inverse_mass(pair, &motion));
 
-    // Of two limits the nearer one acts: it pushes the body inwards.
+    // The nearer of the two limits acts. It pushes the body inward.
     let NearerLimit { is_limit, is_upper, gap, apart } = NearerLimit::of(axis, &motion);
     let sign = L::select(one, L::constant(-1.0), is_upper);
 
-    // A motor acts in every sweep, a spring in biased ones; locks and limits are pulled shut softly, or not at all in a relax sweep.
+    // A motor acts in every sweep, and a spring in biased sweeps. Locks and limits close gaps softly, or not at all in
+    // a relax sweep.
     let is_drive = (axis.mass_scale + axis.impulse_scale).gt(zero);
     let (mut rate, mut mass_scale, mut impulse_scale);
     if rules.biased {
@@ -170,7 +171,7 @@ pub fn solve_axis<L: Lane>(
         mass_scale = L::select(one, zero, axis.impulse_scale.gt(zero));
         impulse_scale = zero;
     }
-    // Apart from its limit the body may close the gap in this substep.
+    // A body away from its limit may reach it within this substep.
     rate = L::select(rate, params.inverse_substep, apart);
     mass_scale = L::select(mass_scale, one, apart);
     impulse_scale = L::select(impulse_scale, zero, apart);

@@ -1,8 +1,8 @@
-//! The sweeps of one manifold. Doubles of `shaders/lib/contact.wgsl` and of the kernels
-//! `clear_impulses`, `sum_impulses`, `warm_start`, `solve_contacts` and `apply_restitution`.
+//! The sweeps of one manifold. Twins of `shaders/lib/contact.wgsl` and of the kernels `clear_impulses`, `sum_impulses`,
+//! `warm_start`, `solve_contacts` and `apply_restitution`.
 //!
-//! A point whose effective masses and impulses are zero is left alone, so that manifolds with fewer points can share
-//! the lanes of fuller ones. With friction per manifold the last of the rows is the patch.
+//! A point with zero effective masses and impulses changes nothing, so manifolds with fewer points can share lanes with
+//! fuller ones. With friction per manifold, the last row is the patch.
 
 use super::Rules;
 use super::friction::{solve_friction, solve_twist};
@@ -12,9 +12,9 @@ use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
 use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, reciprocal, smaller};
 
-/// The points of a manifold and their impulses, wherever they stand.
+/// The points of a manifold and their impulses, in any storage.
 pub trait PointRows<L> {
-    /// How many there are, the patch included.
+    /// Number of points, including the patch.
     fn count(&self) -> usize;
     /// The point `k`.
     fn point(&self, k: usize) -> Point<L>;
@@ -49,14 +49,14 @@ impl<L: Lane> PointRows<L> for (&[Point<L>], &mut [Impulse<L>]) {
     }
 }
 
-/// How the bodies of a contact moved along its normal since the step began.
+/// Movement of the bodies of a contact along its normal since the step began.
 #[inline(always)]
 pub fn normal_movement<L: Lane>(rules: Rules, pair: &Pair<L>, contact: &Contact<L>) -> NormalMovement<L> {
     let movement = NormalMovement::new(contact.normal, pair.b.dp - pair.a.dp, pair.a.dq, pair.b.dq);
     if rules.round { movement.round(contact.normal, contact.radius_a, contact.radius_b) } else { movement }
 }
 
-/// The separation that the contact acts on: the separation when the step began, less the preload, and the movement of the bodies since.
+/// The separation that the solver uses: the separation when the step began, less the preload, plus the movement since.
 #[inline(always)]
 pub fn current_separation<L: Lane>(movement: &NormalMovement<L>, contact: &Contact<L>, point: &Point<L>) -> L {
     (point.separation - contact.preload) + movement.between(point.r_a, point.r_b)
@@ -75,7 +75,8 @@ fn pair_softness<L: Lane>(params: &StepParams<L>, pair: &Pair<L>) -> SoftnessOf<
     }
 }
 
-/// The impulse pushes, never pulls: the sum of the corrections, or each by itself.
+/// Clamps the normal impulse, which pushes and never pulls. The rules clamp the sum of the corrections, or each
+/// correction.
 #[inline(always)]
 fn clamp_normal<L: Lane>(rules: Rules, sum: L, correction: L) -> L {
     let zero = L::constant(0.0);
@@ -88,11 +89,11 @@ struct Common<L> {
     movement: NormalMovement<L>,
 }
 
-/// The change of the normal impulse that a point asks for by itself.
+/// The change of the normal impulse that a point needs by itself.
 ///
-/// The soft law jumps where the surfaces just touch, from rigid on one side to soft on the other: a separation of 1e-11 m
-/// that rounding puts on the other side changes a sweep by what the spring is soft. That is why plain WGSL agrees with
-/// the reference to 1e-6 m/s in the middle of a step and to a few hundredths in the worst one.
+/// The soft law jumps where the surfaces just touch, from rigid on one side to soft on the other. If rounding moves a
+/// separation of 1e-11 m to the other side, the sweep changes by the softness of the spring. For this reason, plain
+/// WGSL agrees with the reference to 1e-6 m/s in a typical step and to a few hundredths in the worst one.
 #[inline(always)]
 fn normal_correction<L: Lane>(
     rules: Rules,
@@ -105,7 +106,8 @@ fn normal_correction<L: Lane>(
 ) -> L {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let s = current_separation(movement, contact, point);
-    // Apart: may close the gap in this substep. Overlapping: pushed out softly, or not at all in a relax sweep.
+    // Surfaces apart may close the gap in this substep. Overlapping surfaces are pushed apart softly, or not at all in
+    // a relax sweep.
     let apart = s.gt(zero);
     let pushed = softness.bias_rate * smaller(s + params.slop, zero);
     let bias = L::select(if rules.biased { pushed } else { zero }, s * params.inverse_substep, apart);
@@ -114,7 +116,7 @@ fn normal_correction<L: Lane>(
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
     let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
-    // The limit is one of speed, not of force: at the limit a contact bears whatever load it carries.
+    // This limits the speed and not the force, so a contact at the limit still carries any load.
     let correction = if rules.biased { smaller(spring, -(mass * (vn - softness.push_limit))) } else { spring };
     params.relaxation * correction
 }
@@ -141,10 +143,11 @@ fn solve_normal<L: Lane>(
     apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
 }
 
-/// Changes the impulses of all points of a manifold together, by the share of what each would change by itself that leaves the least energy of what
-/// they lack: steepest descent. `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. What points
-/// change in common is one impulse at their middle, and no point takes more than its share because it comes first. A point may pull after that,
-/// until it is solved.
+/// Changes the impulses of all points of a manifold together, by steepest descent. The direction is the vector of the
+/// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
+/// still lack. `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. The
+/// common change of all points is one impulse at their middle, and no point takes more than its share because it comes
+/// first. A point may pull after this, until it is solved alone.
 #[inline(always)]
 fn press_as_one<L: Lane>(
     rules: Rules,
@@ -179,7 +182,8 @@ fn press_as_one<L: Lane>(
         (spin_of(rules, pair.mass_a.inv_inertia, turn_a), spin_of(rules, pair.mass_b.inv_inertia, turn_b));
     let turned = dot3(turn_a, spin_a) + dot3(turn_b, spin_b);
     let moved = (all * all) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turned;
-    // The share of points that lack the same is the most: what differs from point to point is left to the sweep.
+    // The share is at most that of points that all lack the same velocity. The sweep handles the differences between
+    // points.
     let inverse = reciprocal(larger(count, one));
     let (about_a, about_b) = (cross3(middle_a * inverse, contact.normal), cross3(middle_b * inverse, contact.normal));
     let turning = dot3(about_a, spin_of(rules, pair.mass_a.inv_inertia, about_a))
@@ -202,15 +206,16 @@ fn press_as_one<L: Lane>(
     pair.b.w += spin_b * share;
 }
 
-/// What a point lacks to change its impulse by `correction` without a bound; nothing where it has no mass.
+/// The velocity that a point lacks, from its unclamped `correction`; 0 if the point has no mass.
 #[inline(always)]
 fn lacking<L: Lane>(point: &Point<L>, correction: L) -> L {
     let zero = L::constant(0.0);
     L::select(zero, correction * reciprocal(point.normal_mass), point.normal_mass.gt(zero))
 }
 
-/// Non-penetration of all points together, before each is solved by itself: where each is solved, none of them would change. Swept one after
-/// another only, the points of a flat blow turn the body, because the first one takes more than its share.
+/// Non-penetration of all points together, before each is solved alone. It changes nothing if each point is solved. If
+/// points were only swept one after another, those of a flat blow would turn the body, because the first one takes more
+/// than its share.
 #[inline(always)]
 fn solve_as_one<L: Lane>(
     rules: Rules,
@@ -226,26 +231,27 @@ fn solve_as_one<L: Lane>(
     });
 }
 
-/// Forgets the impulse of one point. Kernel `clear_impulses`.
+/// Clears the impulse of one point, but not its peak. Kernel `clear_impulses`.
 #[inline(always)]
 pub fn clear_impulse<L: Lane>(impulse: &mut Impulse<L>) {
     *impulse = Impulse { peak: impulse.peak, ..Impulse::default() };
 }
 
-/// Adds the impulse of one point in a substep to those of the substeps before. Kernel `sum_impulses`.
+/// Adds the impulse of one point in a substep to the sum of earlier substeps. Kernel `sum_impulses`.
 #[inline(always)]
 pub fn sum_impulse<L: Lane>(is_first: bool, impulse: &Impulse<L>, total: &mut Impulse<L>) {
     total.set_components(summed(is_first, total.components(), impulse.components()));
     total.peak = L::constant(0.0);
 }
 
-/// The impulse of a substep and those of the substeps before; the first substep begins the sum. Kernel `sum_joint_impulses`.
+/// The impulse of a substep added to the sum of earlier substeps. The first substep begins the sum. Kernel
+/// `sum_joint_impulses`.
 #[inline(always)]
 pub fn summed<L: Lane>(is_first: bool, before: Vec3<L>, now: Vec3<L>) -> Vec3<L> {
     if is_first { now } else { before + now }
 }
 
-/// Applies the impulses that a manifold already carries. Kernel `warm_start`.
+/// Applies the carried impulses of a manifold. Kernel `warm_start`.
 #[inline(always)]
 pub fn warm_start<L: Lane>(rules: Rules, pair: &mut Pair<L>, contact: &Contact<L>, rows: &impl PointRows<L>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
@@ -330,7 +336,7 @@ fn sweep_friction<L: Lane>(
     }
 }
 
-/// Makes the points bounce that were hit fast enough: together, then each. Kernel `apply_restitution`.
+/// Makes the points that were hit fast enough bounce: first together, then each alone. Kernel `apply_restitution`.
 #[inline(always)]
 pub fn restitute_contact<L: Lane>(
     rules: Rules,

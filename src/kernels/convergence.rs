@@ -2,7 +2,7 @@
 
 use crate::problem::ConvergenceRow;
 
-/// Decides whether the sweep that follows is still needed, and counts it. Kernel `begin_sweep`.
+/// Decides whether the next sweep is still needed, and counts it. Kernel `begin_sweep`.
 pub fn begin_sweep(first: bool, convergence: &mut ConvergenceRow) {
     let done = !first && (convergence.done != 0 || convergence.moving == 0);
     convergence.done = u32::from(done);

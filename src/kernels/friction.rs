@@ -1,4 +1,4 @@
-//! Friction at one point or over one manifold. Doubles of `shaders/lib/friction.wgsl`.
+//! Friction at one point or over one manifold. Twins of `shaders/lib/friction.wgsl`.
 
 use super::Rules;
 use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
@@ -6,13 +6,13 @@ use super::rows::{Contact, Impulse, Pair, Point, StepParams};
 use crate::config::FrictionRule;
 use crate::math::{Lane, cross3, dot3, larger, smaller};
 
-/// x, no further from 0 than the limit.
+/// x, at most the limit away from 0.
 #[inline(always)]
 fn clamp_abs<L: Lane>(x: L, limit: L) -> L {
     larger(smaller(x, limit), -limit)
 }
 
-/// The tangential impulse nearest to y that the rule allows under the normal impulse's limit.
+/// The tangential impulse nearest to y that the rule allows. `limit` follows from the normal impulse.
 #[inline(always)]
 pub fn allowed_friction<L: Lane>(rule: FrictionRule, y: [L; 2], limit: L) -> [L; 2] {
     if rule != FrictionRule::Disc {
@@ -24,10 +24,10 @@ pub fn allowed_friction<L: Lane>(rule: FrictionRule, y: [L; 2], limit: L) -> [L;
     [y[0] * scale, y[1] * scale]
 }
 
-/// Coulomb friction: the sum of the tangential impulses stays within what the normal impulse allows.
+/// Coulomb friction. It keeps the sum of the tangential impulses within the limit of the normal impulse.
 ///
-/// The step along both tangents has one length, one over the larger eigenvalue of the tangential block: with a matrix
-/// step the clamped point slips in a wrong direction unless that block is isotropic.
+/// Both tangents share one step length, one over the larger eigenvalue of the tangential block. With a matrix step the
+/// clamped point would slip in a wrong direction, unless the block is isotropic.
 #[inline(always)]
 pub fn solve_friction<L: Lane>(
     rules: Rules,
@@ -49,7 +49,7 @@ pub fn solve_friction<L: Lane>(
     let limit = contact.friction * normal_impulse;
     let mass = params.relaxation * point.tangent_mass;
     let sum = if rules.friction == FrictionRule::Slip {
-        // One direction: the impulses along both tangents are its components.
+        // The impulses along both tangents are the components of one impulse along the slip.
         let along = impulse.tangent_1 * point.slip_1 + impulse.tangent_2 * point.slip_2;
         let s = clamp_abs(along - mass * (u_1 * point.slip_1 + u_2 * point.slip_2), limit);
         [s * point.slip_1, s * point.slip_2]
@@ -65,7 +65,8 @@ pub fn solve_friction<L: Lane>(
     apply_impulse(rules, pair, point.r_a, point.r_b, contact.tangent * change_1 + tangent_2 * change_2);
 }
 
-/// Spin about the normal, limited by the normal impulses times their distance from the middle.
+/// Friction against the spin about the normal, limited by the sum of the normal impulses times their distances from the
+/// middle.
 #[inline(always)]
 pub fn solve_twist<L: Lane>(
     rules: Rules,

@@ -1,20 +1,20 @@
-//! The motion of one body between the sweeps. Doubles of `integrate_velocities`, `integrate_torques`, `damp_velocities`, `integrate_gyroscopic`,
-//! `integrate_positions`, `begin_changes` and `end_changes`.
+//! The motion of one body between the sweeps. Twins of `integrate_velocities`, `integrate_torques`, `damp_velocities`,
+//! `integrate_gyroscopic`, `integrate_positions`, `begin_changes` and `end_changes`.
 //!
-//! In a block of short substeps the velocities of a body are changes since the step began, and [`Free`] holds the velocities from
-//! then: `from_start`. A short substep changes a velocity by little more than the rounding error of the velocity, but by much more
-//! than that of the change.
+//! With `from_start`, in blocks of short substeps, the velocities of a body are changes since the step began, and
+//! [`Free`] holds the velocities at that time. A short substep changes a velocity by little more than the rounding
+//! error of the velocity, but by much more than the rounding error of the change.
 
 use super::rows::{Body, Damping, Free, Inertia, Mass, StepParams};
 use crate::math::{
     Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, select3, turned, vec3,
 };
 
-/// Adds gravity and force; with `warm_start` also the impulses that the substep before ended with.
+/// Adds gravity and force. With `warm_start` it also applies the impulses from the end of the substep before.
 ///
-/// Masses and arms stay the same within a step, so that the impulses change the velocities by the same M⁻¹ Gᵀ λ in every substep.
-/// That change is the difference between the velocities and the free velocities. The warm start of every substep but the first
-/// therefore costs one subtraction and one addition a body, and no pass over the contacts.
+/// Masses and arms stay the same within a step, so the impulses change the velocities by the same M⁻¹ Gᵀ λ in every
+/// substep. This change is the difference between the velocities and the free velocities. After the first substep, a
+/// warm start therefore costs one subtraction and one addition for each body, and no pass over the contacts.
 #[inline(always)]
 pub fn integrate_velocities<L: Lane>(
     warm_start: bool,
@@ -52,7 +52,8 @@ pub fn integrate_torque<L: Lane>(
     body.w += turn;
 }
 
-/// Lets the velocity decay that a body has without the impulses of this substep. The velocities of a body without damping keep every bit.
+/// Damps the velocity that a body has without the impulses of this substep. The velocities of a body without damping
+/// keep every bit.
 #[inline(always)]
 pub fn damp_velocities<L: Lane>(from_start: bool, damping: &Damping<L>, body: &mut Body<L>, free: &mut Free<L>) {
     let (mut v, mut w) = (free.v, free.w);
@@ -82,21 +83,22 @@ pub fn integrate_positions<L: Lane>(from_start: bool, params: &StepParams<L>, bo
     body.dq = renormalized(quat_mul(exp_rotation(w * params.substep), body.dq));
 }
 
-/// The velocities of a body become changes: none yet. A body that nothing pushes keeps its velocities: bodies that rest are in no block, and
-/// no pass writes their rows of `free`.
+/// Turns the velocities of a body into changes, which are zero at first. A body that nothing pushes keeps its
+/// velocities. Bodies at rest are in no block, and no pass writes their rows of `free`.
 #[inline(always)]
 pub fn begin_changes<L: Lane>(mass: &Mass<L>, body: &mut Body<L>, free: &mut Free<L>) {
     *free = start_of(mass, &Free { v: body.v, w: body.w });
     (body.v, body.w) = (body.v - free.v, body.w - free.w);
 }
 
-/// The changes of a body become velocities.
+/// Turns the changes of a body back into velocities.
 #[inline(always)]
 pub fn end_changes<L: Lane>(body: &mut Body<L>, free: &Free<L>) {
     (body.v, body.w) = (free.v + body.v, free.w + body.w);
 }
 
-/// The velocities that those of a body are changes of: zero for a body that nothing pushes.
+/// The velocities of a body at the start of the step, to which its changes are added; zero for a body that nothing
+/// pushes.
 #[inline(always)]
 pub fn start_of<L: Lane>(mass: &Mass<L>, free: &Free<L>) -> Free<L> {
     let is_movable = mass.inv_mass.gt(L::constant(0.0));
@@ -113,7 +115,7 @@ fn solve_3x3<L: Lane>(row_0: Vec3<L>, row_1: Vec3<L>, row_2: Vec3<L>, g: Vec3<L>
     (c_0 * g.x + c_1 * g.y + c_2 * g.z) * reciprocal(dot3(row_0, c_0))
 }
 
-/// The correction of one step of Newton's method on change + h I⁻¹ (m x I m) = 0, where m is the spin midway.
+/// The correction of one step of Newton's method on change + h I⁻¹ (m x I m) = 0, where m is the midpoint spin.
 #[inline(always)]
 fn newton_step<L: Lane>(inertia: &Inertia<L>, h: L, m: Vec3<L>, change: Vec3<L>) -> Vec3<L> {
     let (one, half) = (L::constant(1.0), L::constant(0.5));
@@ -127,8 +129,9 @@ fn newton_step<L: Lane>(inertia: &Inertia<L>, h: L, m: Vec3<L>, change: Vec3<L>)
     solve_3x3(row_0, row_1, row_2, residual)
 }
 
-/// The change of a spin in the time h, by `steps` steps of Newton's method. The unknown is the spin after h. With `from_start` the unknown
-/// is the change itself, because the rounding error of a spin is of the size of what a short substep changes.
+/// The change of a spin in the time h, by `steps` steps of Newton's method. The unknown is the spin after h. With
+/// `from_start` the unknown is the change itself, because a short substep changes a spin by about as much as its
+/// rounding error.
 #[inline(always)]
 fn spin_change<S: Scalar>(from_start: bool, steps: u32, inertia: &Inertia<S>, h: S, spin: Vec3<S>) -> Vec3<S> {
     let half = S::constant(0.5);
@@ -146,11 +149,11 @@ fn spin_change<S: Scalar>(from_start: bool, steps: u32, inertia: &Inertia<S>, h:
     next - spin
 }
 
-/// Square of the angle (rad) up to which two Newton steps leave no more than rounding.
+/// Square of the largest angle (rad) at which two Newton steps leave only rounding errors.
 const SLOW: f64 = 0.0625;
 
-/// The change that `integrate_gyroscopic` makes to the angular velocity `w` of a body whose spin about its principal axes is fast: its
-/// `square` is (h W)².
+/// The change of the angular velocity `w` by `integrate_gyroscopic`, for a body that spins fast about its principal
+/// axes. `square` is (h W)².
 #[cold]
 #[inline(never)]
 fn fast_turn<S: Scalar>(
@@ -166,8 +169,9 @@ fn fast_turn<S: Scalar>(
     let h = if square > one { substep * square.inverse_sqrt() } else { substep };
     let change = spin_change(from_start, 4, inertia, h, spin);
     let turn = x * change.x + y * change.y + z * change.z;
-    // Axes that are not quite of unit length stretch a large change, always in the same sense: the energy E is set back, to
-    // E (3 - E)² / 4 of what it was, which is never above 1. A spin whose energy is no number stays.
+    // Axes that are not quite of unit length stretch a large change, always in the same direction. The scale brings the
+    // energy back. With the ratio E of the energies after and before, the result has E (3 - E)² / 4 of the energy
+    // before, which is never more. A spin stays if its energy is NaN or would at least triple.
     let changed = w + turn;
     let after = vec3(dot3(x, changed), dot3(y, changed), dot3(z, changed));
     let energy = dot3(inertia.principal * spin, spin);
@@ -176,16 +180,17 @@ fn fast_turn<S: Scalar>(
     if one > scale * scale { turn + changed * scale } else { Vec3::default() }
 }
 
-/// Turns the spin of a body with unequal moments of inertia, by implicit midpoint: I (x - w) + h m x I m = 0 with m
-/// midway, which keeps energy and momentum (to 1e-9 over 20 s in f64, where explicit Euler gains eightfold and implicit
-/// Euler loses most of it). Two Newton steps; four for a fast spin, whose energy is set back to what it was besides.
+/// Changes the spin of a body with unequal moments of inertia, by the implicit midpoint rule: I (x - w) + h m x I m =
+/// 0, where m is the midpoint spin. It keeps energy and momentum, to 1e-9 over 20 s in f64. In that time explicit Euler
+/// multiplies the energy by eight, and implicit Euler loses most of it. The solution takes two Newton steps, or four
+/// for a fast spin, whose energy is also brought back.
 ///
-/// In the principal axes w_x' = a_x w_y w_z and so on, with a_x = (I_y - I_z)/I_x. Each w_i in its own unit makes the three
-/// coefficients one but for their signs, which are the same for all bodies. So how far Newton's method gets depends on the direction
-/// and on one number, the angle h W with W² = |a_y a_z| w_x² + |a_z a_x| w_y² + |a_x a_y| w_z². Measured over all directions,
-/// relative change of energy and momentum: after two steps 6e-9 at 0.25 rad, 1e-3 at 1 and without bound from 2 on; after
-/// four 1e-15 at 1. Midpoint keeps both over any time, so the torque acts for 1/W at most, as `exp_rotation` turns a body by 4 rad
-/// at most.
+/// In the principal axes w_x' = a_x w_y w_z and so on, with a_x = (I_y - I_z)/I_x. If each w_i has a suitable unit, the
+/// three coefficients are 1 except for their signs, which are the same for all bodies. The accuracy of Newton's method
+/// therefore depends only on the direction and on one number, the angle h W with W² = |a_y a_z| w_x² + |a_z a_x| w_y² +
+/// |a_x a_y| w_z². The relative change of energy and momentum, measured over all directions, is 6e-9 at 0.25 rad and
+/// 1e-3 at 1 rad after two steps, and unbounded from 2 rad on. After four steps it is 1e-15 at 1 rad. The midpoint rule
+/// keeps both over any time, so the torque acts for at most 1/W, as `exp_rotation` turns a body by at most 4 rad.
 #[inline(always)]
 pub fn integrate_gyroscopic<S: Scalar>(
     from_start: bool,
@@ -197,14 +202,14 @@ pub fn integrate_gyroscopic<S: Scalar>(
     let (zero, one) = (S::constant(0.0), S::constant(1.0));
     let (p, k) = (inertia.principal, inertia.inv_principal);
 
-    // The principal axes now.
+    // The present principal axes.
     let q = quat_mul(body.dq, inertia.frame);
     let (unit_x, unit_y, unit_z) = (vec3(one, zero, zero), vec3(zero, one, zero), vec3(zero, zero, one));
     let x = turned(q, unit_x) + unit_x;
     let y = turned(q, unit_y) + unit_y;
     let z = turned(q, unit_z) + unit_z;
 
-    // The free spin: impulses come after.
+    // The free spin. Impulses come later.
     let w = if from_start { free.w + body.w } else { free.w };
     let spin = vec3(dot3(x, w), dot3(y, w), dot3(z, w));
 
@@ -216,7 +221,7 @@ pub fn integrate_gyroscopic<S: Scalar>(
     let square = dot3(sizes, angle * angle);
 
     let turn = if S::constant(SLOW) > square {
-        // Only the change is turned back: rounding of the axes would otherwise stretch a spin that nothing changes.
+        // Only the change is turned back. Otherwise rounding of the axes would stretch a spin that nothing changes.
         let change = spin_change(from_start, 2, inertia, params.substep, spin);
         x * change.x + y * change.y + z * change.z
     } else {

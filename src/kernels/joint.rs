@@ -1,5 +1,5 @@
-//! One joint: the anchors of two bodies stay together, unless axes guide them. Doubles of `shaders/lib/joint.wgsl` and of the kernels
-//! `warm_start_joints` and `solve_joints`.
+//! One joint, which keeps the anchors of two bodies together unless axes guide them. Twins of `shaders/lib/joint.wgsl`
+//! and of the kernels `warm_start_joints` and `solve_joints`.
 
 use super::Rules;
 use super::axis::select3;
@@ -7,13 +7,13 @@ use super::pair::{apply_impulse, note_correction, relative_movement, relative_ve
 use super::rows::{Joint, Mass, Pair, StepParams};
 use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, turned, vec3};
 
-/// The arms now: what they were when the step began, turned with their bodies.
+/// The present arms. They turned with their bodies since the step began.
 #[inline(always)]
 pub fn current_anchors<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [Vec3<L>; 2] {
     [joint.r_a + turned(pair.a.dq, joint.r_a), joint.r_b + turned(pair.b.dq, joint.r_b)]
 }
 
-/// The column of the body's share of G M⁻¹ Gᵀ that belongs to the axis e: (I⁻¹ (r x e)) x r.
+/// The column for the axis e of one body's contribution to G M⁻¹ Gᵀ: (I⁻¹ (r x e)) x r.
 #[inline(always)]
 fn turning_column<L: Lane>(m: &Mass<L>, r: Vec3<L>, e: Vec3<L>) -> Vec3<L> {
     cross3(m.inv_inertia.times(cross3(r, e)), r)
@@ -26,22 +26,22 @@ pub fn joint_column<L: Lane>(pair: &Pair<L>, anchors: [Vec3<L>; 2], e: Vec3<L>) 
     e * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning
 }
 
-/// Double of the WGSL struct `Cofactors`: what the inverse of a symmetric block is made of.
+/// The parts of the inverse of a symmetric block. Twin of the WGSL struct `Cofactors`.
 pub(super) struct Cofactors<L> {
     pub x: Vec3<L>,
     pub y: Vec3<L>,
     pub z: Vec3<L>,
     pub determinant: L,
-    /// The factor that the block was scaled by.
+    /// The factor that scaled the block.
     pub scale: L,
 }
 
-/// The cofactors of the symmetric block with these columns. The block is scaled to a trace of 1 to 2 before: the determinant of that of
-/// 1e7 kg would leave single precision.
+/// The cofactors of the symmetric block with these columns. The block is first scaled to a trace of 1 to 2, because the
+/// determinant of a block of 1e7 kg would leave single precision.
 ///
-/// A ball of 1 mm at the end of 1 m is 2.5e6 times as hard to move along the arm as across it: rounding makes such a block
-/// indefinite. One whose determinant is below `stiffening` is made stiffer by that, so that corrections along the arm are too small, never
-/// too large.
+/// A ball of 1 mm at the end of a 1 m arm is 2.5e6 times as hard to move along the arm as perpendicular to it. Rounding
+/// makes such a block indefinite. If the determinant is below `stiffening`, this number is added to the diagonal.
+/// Corrections along the arm are then too small, never too large.
 #[inline(always)]
 pub(super) fn cofactors<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, stiffening: f64) -> Cofactors<L> {
     let scale = (x.x + y.y + z.z).inverse_power();
@@ -60,10 +60,10 @@ fn solve_block<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, u: Vec3<L>) -> Vec3<
     vec3(dot3(c.x, u), dot3(c.y, u), dot3(c.z, u)) * reciprocal(c.determinant) * c.scale
 }
 
-/// Rounding changes the determinant of a block of trace 1 to 2 by 3e-7; this is 2^-19.
+/// 2^-19. Rounding changes the determinant of a block with a trace of 1 to 2 by 3e-7.
 const STIFFENING: f64 = 1.907_348_632_812_5e-6;
 
-/// Applies the impulse that a joint already carries. Kernel `warm_start_joints`.
+/// Applies the carried impulse of a joint. Kernel `warm_start_joints`.
 #[inline(always)]
 pub fn warm_start_joint<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, impulse: Vec3<L>) {
     let [r_a, r_b] = current_anchors(pair, joint);
@@ -85,7 +85,7 @@ pub fn solve_joint<L: Lane>(
     let y = joint_column(pair, anchors, vec3(zero, one, zero));
     let z = joint_column(pair, anchors, vec3(zero, zero, one));
 
-    // The gap is pulled shut softly, or not at all in a relax sweep.
+    // The gap is closed softly, or not at all in a relax sweep.
     let before = *impulse;
     let mut wanted = relative_velocity(rules, pair, anchors[0], anchors[1]);
     let (mut mass_scale, mut impulse_scale) = (one, zero);

@@ -1,11 +1,12 @@
-//! All joints of a connected set of bodies, solved at once: S λ = -u by S = L D Lᵀ in blocks of 3 x 3. Doubles of
+//! All joints of a connected set of bodies, solved directly: S λ = -u by S = L D Lᵀ in blocks of 3 x 3. Twins of
 //! `shaders/lib/joint_system.wgsl` and of the kernels `begin_systems`, `measure_joints`, `solve_joint_systems` and
 //! `apply_joint_changes`.
 //!
-//! A node of a system is up to three rows of one joint: its anchors, its locks and limits to shift along, or those to turn about. Drives are
-//! swept (`solve_axes`), and so are limits until they bear an impulse: from then on they hold as locks do. A limit that would pull is left to
-//! sweeps again: its row goes, and the system is factored without it. Arms and axes turn with their bodies, and the blocks of S with them: S is factored anew where bodies moved. The
-//! order of elimination, the blocks that it fills and the products that each block is made of are lists of the problem (`JointSystems`).
+//! A node of a system is up to three rows of one joint: its anchors, its locks and limits of shifts, or those of turns.
+//! Drives are swept (`solve_axes`). Limits are swept until they have an impulse, and hold like locks from then on. A
+//! limit that would pull returns to the sweeps: the solver removes its row and factors the system without it. Arms and
+//! axes turn with their bodies, and the blocks of S with them, so S is factored anew when bodies have moved. The
+//! problem lists the order of elimination, the nonzero blocks, and the products in each block (`JointSystems`).
 
 use super::Rules;
 use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock, select3};
@@ -15,8 +16,8 @@ use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, turned, vec3};
 use crate::problem::JointSystems;
 
-/// A block of a matrix, by its columns. A fourth number, which nothing reads, makes a column of single numbers a register; only they work on it
-/// ([`Lane::COLUMN`]).
+/// A block of a matrix, as three columns. Each column has a fourth number, which nothing reads, so that a column of
+/// single numbers fills a register. Only columns of single numbers compute with it ([`Lane::COLUMN`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Block<L>([[L; 4]; 3]);
 
@@ -56,7 +57,7 @@ impl<L: Lane> Block<L> {
         vec3(self.0[0][0], self.0[1][1], self.0[2][2])
     }
 
-    /// Makes the diagonal larger.
+    /// Adds a number to the diagonal.
     #[inline(always)]
     pub fn soften(&mut self, more: L) {
         for i in 0..3 {
@@ -110,7 +111,7 @@ impl<L: Lane> Block<L> {
         sum
     }
 
-    /// The block of L D below a factored pivot, from that of S.
+    /// The block of L D below a factored pivot. `self` is the block of S, less its products.
     #[inline(always)]
     pub fn over(&self, pivot: &Self) -> Self {
         let ([x, y, z], [l_x, l_y, _]) = (&self.0, &pivot.0);
@@ -122,13 +123,13 @@ impl<L: Lane> Block<L> {
         over
     }
 
-    /// The block with its columns times three numbers.
+    /// The block with its columns scaled by three numbers.
     #[inline(always)]
     pub fn with_columns_times(&self, factors: Vec3<L>) -> Self {
         Self::of(self.column(0) * factors.x, self.column(1) * factors.y, self.column(2) * factors.z)
     }
 
-    /// l⁻¹ u of a factored pivot.
+    /// l⁻¹ u, where this block is a factored pivot.
     #[inline(always)]
     pub fn forward(&self, u: Vec3<L>) -> Vec3<L> {
         let [x, y, _] = &self.0;
@@ -136,7 +137,7 @@ impl<L: Lane> Block<L> {
         vec3(u.x, second, u.z - x[2] * u.x - y[2] * second)
     }
 
-    /// l⁻ᵀ u of a factored pivot.
+    /// l⁻ᵀ u, where this block is a factored pivot.
     #[inline(always)]
     pub fn backward(&self, u: Vec3<L>) -> Vec3<L> {
         let [x, y, _] = &self.0;
@@ -144,7 +145,7 @@ impl<L: Lane> Block<L> {
         vec3(u.x - x[1] * second - x[2] * u.z, second, u.z)
     }
 
-    /// The block times a number.
+    /// The block scaled by a number.
     #[inline(always)]
     pub fn scaled(&self, factor: L) -> Self {
         let mut scaled = *self;
@@ -156,7 +157,7 @@ impl<L: Lane> Block<L> {
         scaled
     }
 
-    /// Less another block.
+    /// The difference from another block.
     #[inline(always)]
     pub fn less(&self, other: &Self) -> Self {
         let mut rest = *self;
@@ -169,20 +170,21 @@ impl<L: Lane> Block<L> {
     }
 }
 
-/// The least pivot of a row, relative to the sum of those of its block in S: rounding of the products that are subtracted from a pivot leaves
-/// less. This is 2^-20. A smaller pivot makes corrections too small, never too large.
+/// The smallest pivot of a row, relative to the trace of its block in S: 2^-20, above the rounding errors of the
+/// products that are subtracted from a pivot. A smaller pivot is raised to this, so corrections are too small, never
+/// too large.
 const LEAST_PIVOT: f64 = 9.536_743_164_062_5e-7;
 
-/// One over a pivot, which counts as at least `least`; 0 of a row that had a zero in S.
+/// One over a pivot of at least `least`; 0 for a row whose diagonal was zero in S.
 #[inline(always)]
 fn inverse_pivot<L: Lane>(pivot: L, own: L, least: L) -> L {
     let zero = L::constant(0.0);
     L::select(zero, reciprocal(larger(pivot, least)), own.gt(zero))
 }
 
-/// A pivot whose rows had this diagonal in S as l d lᵀ: below the diagonal l, on it 1/d, which is zero in a row that is not there and had a zero
-/// in S. Solutions by the inverse would lose as many digits as a pivot is stiffer in one direction than in another: a lever across its
-/// hinge 1e5 times.
+/// The factors l d lᵀ of a pivot, whose diagonal in S was `own`. The result has l below the diagonal, and 1/d on it. In
+/// a missing row, whose diagonal in S is zero, 1/d is zero. A solution by the inverse would lose precision by the ratio
+/// of the stiffnesses of a pivot in different directions, which is 1e5 for a lever and its hinge.
 #[inline(always)]
 pub fn factored_pivot<L: Lane>(pivot: &Block<L>, own: Vec3<L>) -> Block<L> {
     let zero = L::constant(0.0);
@@ -197,7 +199,7 @@ pub fn factored_pivot<L: Lane>(pivot: &Block<L>, own: Vec3<L>) -> Block<L> {
     Block::of(vec3(d_x, l_xy, l_xz), vec3(zero, d_y, l_yz), vec3(zero, zero, d_z))
 }
 
-/// An inverse inertia that turned with its body by q since the step began. Kernel `turn_inertias`.
+/// An inverse inertia after the rotation q of its body since the step began. Kernel `turn_inertias`.
 #[inline(always)]
 pub fn turned_inertia<L: Lane>(begin: Sym3<L>, q: Quat<L>) -> Sym3<L> {
     let Sym3 { x: Vec3 { x: xx, y: xy, z: xz }, yz: Vec3 { x: yy, y: yz, z: zz } } = begin;
@@ -209,7 +211,7 @@ pub fn turned_inertia<L: Lane>(begin: Sym3<L>, q: Quat<L>) -> Sym3<L> {
     Sym3 { x: p, yz: vec3(r.y, r.z, s.z) }
 }
 
-/// The anchors of a joint as three rows, along the axes of the world. Their impulses are those on body b.
+/// The anchors of a joint as three rows, along the axes of the world. Their impulses act on body b.
 #[inline(always)]
 pub fn anchor_motions<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [AxisMotion<L>; 3] {
     let (zero, less) = (L::constant(0.0), L::constant(-1.0));
@@ -222,28 +224,28 @@ pub fn anchor_motions<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [AxisMotion<
     motions
 }
 
-/// The softness of a node whose system is not factored since it began.
+/// Marks, as a softness, a node whose system has not been factored since it began.
 const NOT_FACTORED: f64 = -1.0;
 
-/// Up to three rows of a joint while its system is factored. Double of the WGSL struct `JointNode`.
+/// Up to three rows of a joint while its system is factored. Twin of the WGSL struct `JointNode`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointNode<L> {
-    /// Along which its rows push a, and the other way b.
+    /// The directions in which its rows push a, and the opposite of those for b.
     pub along: Block<L>,
-    /// About which its rows turn a, and the other way b.
+    /// The axes about which its rows turn a, and the opposite of those for b.
     pub about: [Block<L>; 2],
-    /// The turns that unit impulses give a and b, column by column.
+    /// The changes of spin of a and b by unit impulses, column by column.
     pub turns: [Block<L>; 2],
     /// Inverse masses of a and b.
     pub inv_masses: [L; 2],
-    /// The velocity that a row gives way by per impulse; 0 of a rigid joint, `NOT_FACTORED` before it is known.
+    /// The velocity by which a row yields to a unit impulse; 0 for a rigid joint, `NOT_FACTORED` before it is known.
     pub softness: L,
-    /// The right side, then the correction.
+    /// The right-hand side, then the correction.
     pub right: Vec3<L>,
 }
 
 impl<L: Lane> JointNode<L> {
-    /// The node of three rows; one that is not there is zero.
+    /// The node of three rows. A missing row is zero.
     #[inline(always)]
     pub fn of(pair: &Pair<L>, [x, y, z]: &[AxisMotion<L>; 3]) -> Self {
         let (a, b) = (pair.mass_a.inv_inertia, pair.mass_b.inv_inertia);
@@ -260,7 +262,7 @@ impl<L: Lane> JointNode<L> {
         }
     }
 
-    /// Takes a row out, where the mask holds.
+    /// Removes a row where the mask holds.
     #[inline(always)]
     fn remove(&mut self, i: usize, mask: L::Mask) {
         let zero = L::default();
@@ -277,8 +279,8 @@ impl<L: Lane> JointNode<L> {
         }
     }
 
-    /// The block of S in its column and the row of another node, which may be the same. `shared` has bit 2 i + j where side i of this
-    /// joint is side j of the other.
+    /// The block of S in the column of this node and the row of another node, or of the same. `shared` has bit 2 i + j
+    /// if side i of this joint is side j of the other.
     #[inline(always)]
     pub fn coupling(&self, row: &Self, shared: u32) -> Block<L> {
         let shift = row.along.product_with_transpose(&self.along);
@@ -294,20 +296,21 @@ impl<L: Lane> JointNode<L> {
     }
 }
 
-/// Both sides of a joint, as those of `shared`.
+/// The sides that a joint shares with itself, in the bits of `shared`.
 const OWN_SIDES: u32 = 0b1001;
 
-/// The factors of one system, or of several of one form side by side. Double of the buffers `joint_nodes` and `joint_blocks`.
+/// The factors of one system, or of several systems of the same form side by side. Twin of the buffers `joint_nodes`
+/// and `joint_blocks`.
 pub struct SystemFactors<'a, L> {
-    /// Its joints.
+    /// Its nodes.
     pub nodes: &'a mut [JointNode<L>],
-    /// The blocks of L; of a pivot, its own factors.
+    /// The blocks of L. A pivot has its own factors here.
     pub lower: &'a mut [Block<L>],
     /// The blocks of L D.
     pub upper: &'a mut [Block<L>],
 }
 
-/// The factors of all systems of a step, one beside another.
+/// The factors of all systems of a step.
 #[derive(Clone, Debug, Default)]
 pub struct JointFactors<S> {
     nodes: Vec<JointNode<S>>,
@@ -323,13 +326,13 @@ impl<S: Scalar> JointFactors<S> {
         self.upper.resize(systems.blocks.len(), Block::default());
     }
 
-    /// All of them, node by node and block by block: the nodes, the blocks of L, those of L D.
+    /// The nodes, the blocks of L and the blocks of L D of all systems.
     #[allow(clippy::type_complexity)]
     pub fn all(&mut self) -> (&mut [JointNode<S>], &mut [Block<S>], &mut [Block<S>]) {
         (&mut self.nodes, &mut self.lower, &mut self.upper)
     }
 
-    /// Those of one system.
+    /// The factors of one system.
     pub fn of(&mut self, systems: &JointSystems, system: usize) -> SystemFactors<'_, S> {
         let (nodes, blocks) = (systems.nodes_of(system), systems.blocks_of_system(system));
         SystemFactors {
@@ -340,7 +343,8 @@ impl<S: Scalar> JointFactors<S> {
     }
 }
 
-/// The joints of a system, or of several of one form side by side. Nodes have their numbers within the system, and up to three rows.
+/// The joints of a system, or of several systems of the same form side by side. Nodes are numbered within the system,
+/// and have up to three rows.
 pub trait SystemRows<L: Lane> {
     /// The joint of a node, with its bodies.
     fn joint(&self, node: usize) -> (Joint<L>, Pair<L>);
@@ -352,12 +356,12 @@ pub trait SystemRows<L: Lane> {
     fn impulse(&self, node: usize, row: usize) -> L;
     /// The velocity that a row lacks.
     fn lacking(&self, node: usize, row: usize) -> L;
-    /// Keeps a correction, and adds it to the impulse.
+    /// Stores a correction, and adds it to the impulse.
     fn change(&mut self, node: usize, row: usize, change: L);
 }
 
-/// Lets a system begin where its bodies are: writes the rows of its nodes, which the next solution factors. `system` is one of its form. Kernel
-/// `begin_systems`.
+/// Begins a system at the present poses of its bodies. It writes the rows of the nodes, and the next solution factors
+/// them. `system` is one of the systems side by side. Kernel `begin_systems`.
 #[inline(always)]
 pub fn begin_system<L: Lane>(
     systems: &JointSystems,
@@ -379,7 +383,7 @@ pub fn begin_system<L: Lane>(
     }
 }
 
-/// Factors a system whose nodes are known.
+/// Factors a system after its nodes are written.
 #[inline(always)]
 fn factor_blocks<L: Lane>(systems: &JointSystems, system: usize, relative_softness: L, factors: &mut SystemFactors<L>) {
     let SystemFactors { nodes, lower, upper } = factors;
@@ -426,7 +430,7 @@ pub fn measure_joint<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut P
     wanted * -params.relaxation
 }
 
-/// The velocity that a lock lacks, or a limit that holds as one; none of a drive. Kernel `measure_joints`.
+/// The velocity that a lock lacks, or a limit that holds like a lock; 0 for a drive. Kernel `measure_joints`.
 #[inline(always)]
 pub fn measure_axis<L: Lane>(
     rules: Rules,
@@ -439,7 +443,7 @@ pub fn measure_axis<L: Lane>(
     let zero = L::constant(0.0);
     let NearerLimit { is_limit, is_upper, gap, apart } = NearerLimit::of(axis, &motion);
     let rate = if rules.biased { params.joint.bias_rate } else { zero };
-    // Up to its limit the body goes within this substep.
+    // A body away from its limit may reach it within this substep.
     let pull = gap * L::select(rate, params.inverse_substep, apart);
     let speed = axis_speed(rules, pair, &motion);
     let wanted = L::select(speed + pull, speed - pull, is_upper);
@@ -448,7 +452,7 @@ pub fn measure_axis<L: Lane>(
     L::select(of_lock, wanted, is_limit) * -params.relaxation
 }
 
-/// Notes that a velocity above the tolerance is lacking.
+/// Records that a missing velocity is above the tolerance.
 #[inline(always)]
 fn note_lacking<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L>, most: L) {
     if rules.measured {
@@ -456,8 +460,8 @@ fn note_lacking<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L
     }
 }
 
-/// Solves a system: `rows` gives the velocities that its joints lack, and is told the corrections. `system` is one of its form. Kernel
-/// `solve_joint_systems`.
+/// Solves a system. `rows` gives the velocities that its joints lack, and takes the corrections. `system` is one of the
+/// systems side by side. Kernel `solve_joint_systems`.
 #[inline(always)]
 pub fn solve_system<L: Lane>(
     systems: &JointSystems,
@@ -469,7 +473,8 @@ pub fn solve_system<L: Lane>(
     for node in &mut *factors.nodes {
         node.right = Vec3::default();
     }
-    // Systems side by side begin together. One that lets go of nothing is factored and solved to the same bits again while others do.
+    // Systems side by side begin together. A system that keeps all its limits is factored and solved again with the
+    // same bits, while others let go of some.
     let is_new = L::any(L::default().gt(factors.nodes[0].softness));
     let mut changed = let_go(systems, system, is_new, rows, &mut factors) || is_new;
     loop {
@@ -492,8 +497,8 @@ pub fn solve_system<L: Lane>(
     }
 }
 
-/// Takes the limits out of a system that hold, and bear no impulse or would pull with the changes that were found; whether there were any. In a
-/// system that is new, all hold.
+/// Removes from a system the limits that hold but have no impulse, or would pull after the changes found. Returns
+/// whether there were any. In a new system, all limits hold.
 #[inline(always)]
 fn let_go<L: Lane>(
     systems: &JointSystems,
@@ -527,7 +532,7 @@ fn let_go<L: Lane>(
     any
 }
 
-/// Finds the changes of the impulses of a system, the right sides of its nodes.
+/// Finds the changes of the impulses of a system, and stores them as the right-hand sides of its nodes.
 #[inline(always)]
 fn find_changes<L: Lane>(
     systems: &JointSystems,

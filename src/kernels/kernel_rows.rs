@@ -1,46 +1,46 @@
-//! A whole problem as the kernels see it.
+//! A problem in the form that the kernels read.
 
 use super::rows::{Axis, Body, Contact, Damping, Impulse, Inertia, Joint, Mass, Momentum, Point, StepParams};
 use crate::math::{Scalar, Vec3};
 use crate::problem::StepProblem;
 
-/// The rows of a problem over one kind of numbers, indices left out.
+/// The rows of a problem over one type of numbers, without indices.
 #[derive(Clone, Debug, Default)]
 pub struct KernelRows<S> {
-    /// The numbers that are the same for all rows of a block, block by block.
+    /// The numbers that are the same for all rows of a block, for each block.
     pub params: Vec<StepParams<S>>,
     /// State of the bodies.
     pub bodies: Vec<Body<S>>,
-    /// Their masses.
+    /// Masses of the bodies.
     pub masses: Vec<Mass<S>>,
-    /// Their angular accelerations by torques, if any has one.
+    /// Angular accelerations of the bodies by torques; empty if no body has a torque.
     pub torques: Vec<Vec3<S>>,
     /// Effects of damping on the bodies; empty if none is damped.
     pub dampings: Vec<Damping<S>>,
-    /// Principal inertia of those whose moments differ.
+    /// Principal inertia of the bodies whose moments differ.
     pub inertias: Vec<Inertia<S>>,
     /// Manifolds.
     pub contacts: Vec<Contact<S>>,
-    /// Their points.
+    /// Points of the manifolds.
     pub points: Vec<Point<S>>,
     /// Impulses of the points.
     pub impulses: Vec<Impulse<S>>,
-    /// Their sums over the substeps.
+    /// Sums of these impulses over the substeps.
     pub totals: Vec<Impulse<S>>,
     /// Joints.
     pub joints: Vec<Joint<S>>,
-    /// Their axes.
+    /// Axes of the joints.
     pub axes: Vec<Axis<S>>,
     /// Impulses of the joints, then of their axes.
     pub joint_impulses: Vec<Vec3<S>>,
-    /// Their sums over the substeps.
+    /// Sums of these impulses over the substeps.
     pub joint_totals: Vec<Vec3<S>>,
     /// How far the sweeps extrapolate.
     pub momentum: Momentum<S>,
 }
 
 impl<S: Scalar> KernelRows<S> {
-    /// From storage.
+    /// Loads all rows from storage.
     pub fn load(&mut self, problem: &StepProblem) {
         fn refill<R, T>(rows: &[R], kept: &mut Vec<T>, load: impl Fn(&R) -> T) {
             kept.clear();
@@ -63,7 +63,7 @@ impl<S: Scalar> KernelRows<S> {
         self.momentum = Momentum::load(&problem.momentum);
     }
 
-    /// The rows that passes change, to storage.
+    /// Stores the rows that passes change.
     pub fn store(&self, problem: &mut StepProblem) {
         problem.bodies.iter_mut().zip(&self.bodies).for_each(|(row, body)| *row = body.store());
         problem.impulses.iter_mut().zip(&self.impulses).for_each(|(row, impulse)| *row = impulse.store());

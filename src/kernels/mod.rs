@@ -1,8 +1,9 @@
-//! The Rust doubles of `shaders/*.wgsl`: same names, same order of operations, over a [`Lane`](crate::math::Lane).
+//! The Rust twins of `shaders/*.wgsl`: same names, same order of operations, over a [`Lane`](crate::math::Lane).
 //!
-//! `pair`, `contact`, `friction` and `joint` are the doubles of the files of that name in `shaders/lib` and of the kernels that sweep
-//! constraints. `integrate` holds the doubles of kernels over bodies, `convergence` and `momentum` those between sweeps. Branches on
-//! data are `select`s; branches on rules are plain `if`s, here and in WGSL.
+//! `pair`, `contact`, `friction` and `joint` are the twins of the files of the same names in `shaders/lib`, and of the
+//! kernels that sweep constraints. `integrate` has the twins of kernels over bodies, and `convergence` and `momentum`
+//! those of kernels between sweeps. Branches on data are `select`s with few exceptions, and branches on rules are plain
+//! `if`s, here and in WGSL.
 
 pub mod axis;
 pub mod contact;
@@ -27,34 +28,34 @@ use crate::config::FrictionRule;
 /// The rules of one kernel. Twin: the struct `Rules` of `shaders/lib/rules.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rules {
-    /// Whether overlap and gaps are removed.
+    /// Whether sweeps remove overlap and gaps.
     pub biased: bool,
-    /// How friction is modelled.
+    /// The model of friction.
     pub friction: FrictionRule,
-    /// Whether friction acts once a manifold.
+    /// Whether friction acts once for each manifold.
     pub patch: bool,
-    /// Whether friction comes before the normals.
+    /// Whether friction comes before the normal impulses.
     pub friction_first: bool,
-    /// Whether the sum of the normal impulses is clamped, and not every correction.
+    /// Whether the sum of the normal impulses is clamped; otherwise each correction is.
     pub accumulated: bool,
     /// Whether any surface is round.
     pub round: bool,
-    /// Whether the points of a manifold are solved together before each by itself.
+    /// Whether the points of a manifold are solved together before each is solved alone.
     pub as_one: bool,
-    /// How often a manifold is swept before the next one, 1 or more.
+    /// Number of sweeps over a manifold before the next one, at least 1.
     pub passes: u8,
-    /// Whether surfaces slip by themselves, as a belt does: friction at points is then against `slip_1` and `slip_2`, a
-    /// velocity added to that of the bodies (m/s). With box or disc friction only.
+    /// Whether surfaces move by themselves, as a belt does. Friction at points then also opposes `slip_1` and `slip_2`,
+    /// velocities relative to the bodies (m/s). Requires box or disc friction.
     pub driven: bool,
-    /// Whether corrections are held against the tolerance.
+    /// Whether corrections are compared with the tolerance.
     pub measured: bool,
     /// Whether velocities of bodies are changes since the step began.
     pub from_start: bool,
-    /// Whether every body that can move has the same moment of inertia about all axes.
+    /// Whether every movable body has the same moment of inertia about all axes.
     pub isotropic: bool,
-    /// Whether any surface bounces: points then keep the largest normal impulse of the step.
+    /// Whether any surface bounces. Points then keep the largest normal impulse of the step.
     pub bounces: bool,
-    /// Whether joints have axes. Shaders with and without them are made of different files.
+    /// Whether joints have axes. Shaders with and without axes consist of different files.
     pub axes: bool,
 }
 
@@ -81,7 +82,7 @@ impl Default for Rules {
 }
 
 impl Rules {
-    /// The rules of a warm start: where friction acts, and nothing else.
+    /// The rules of a warm start, which needs only those of friction and inertia.
     pub fn of_warm_start(self) -> Self {
         Self { friction: self.friction, patch: self.patch, isotropic: self.isotropic, ..Self::default() }
     }
@@ -92,7 +93,7 @@ impl Rules {
         Self { biased, measured, from_start, axes, ..Self::default() }
     }
 
-    /// How many of a manifold's rows are contact points; the patch is not.
+    /// Number of contact points among the rows of a manifold. The patch does not count.
     #[inline(always)]
     pub fn contact_points(self, rows: usize) -> usize {
         if self.patch { rows - 1 } else { rows }

@@ -1,7 +1,7 @@
-//! Nesterov's momentum for sweeps, with a restart where it leads uphill (O'Donoghue and Candès 2015). Doubles of the kernels
-//! `extrapolate`, `measure_step` and `update_momentum`.
+//! Nesterov's momentum for sweeps, with a restart when it leads uphill (O'Donoghue and Candès 2015). Twins of the
+//! kernels `extrapolate`, `measure_step` and `update_momentum`.
 //!
-//! With S one sweep over all constraints, x its result and r where it begins:
+//! S is one sweep over all constraints, x its result, and r its start:
 //!
 //! ```text
 //! x_k = S(r_k-1)        f_k = |x_k - r_k-1|
@@ -10,30 +10,30 @@
 //! else:                 t_k = (1 + sqrt(1 + 4 t_k-1²))/2,  r_k = x_k + (t_k-1 - 1)/t_k (x_k - x_k-1)
 //! ```
 //!
-//! The first condition is the sharper one: a sweep that goes back where momentum went on. But it can hold off for ever on a
-//! cycle, which the second one ends. Numbers are in docs/convergence.md.
+//! The first condition is the stricter one. It holds when a sweep goes back against the momentum. In a cycle it may
+//! never hold, and then the second condition ends momentum. Numbers are in docs/experiments.md.
 //!
-//! Velocities are linear in the impulses and go along with the same factor. The result is x_k, so nothing follows the last
-//! sweep; the factor is 0 before the second.
+//! Velocities are linear in the impulses and use the same factor. The result is x_k, so nothing follows the last sweep.
+//! The factor is 0 before the second sweep.
 
 use std::ops::{Add, Mul, Sub};
 
 use super::rows::{Impulse, ImpulseStep, Momentum};
 use crate::math::{Lane, Scalar, Vec3, dot3, reciprocal, vec3};
 
-/// Threads of a workgroup: how many sums are taken side by side.
+/// Threads of a workgroup, the number of partial sums.
 const WORKGROUP: usize = 64;
-/// Numbers that one workgroup sums, the constant of the same name in `measure_step.wgsl`.
+/// Numbers that one workgroup sums; the constant of the same name in `measure_step.wgsl`.
 pub const IMPULSES_PER_CHUNK: usize = 1024;
 
 impl<S: Scalar> Momentum<S> {
-    /// Begins a sequence of sweeps: none yet.
+    /// Begins a sequence of sweeps.
     pub fn begin(&mut self) {
         let square = S::constant(f32::MAX.into());
         *self = Self { t: S::constant(1.0), factor: S::constant(0.0), square, restarts: self.restarts };
     }
 
-    /// After a sweep. Kernel `update_momentum`.
+    /// Updates the momentum after a sweep. Kernel `update_momentum`.
     pub fn update(&mut self, step: StepLength<S>) {
         let (zero, half, one, four) = (S::constant(0.0), S::constant(0.5), S::constant(1.0), S::constant(4.0));
         let x = one + four * self.t * self.t;
@@ -50,7 +50,7 @@ impl<S: Scalar> Momentum<S> {
     }
 }
 
-/// A sum over impulses. Double of the `vec2f` of `measure_step`.
+/// A sum over impulses. Twin of the `vec2f` of `measure_step`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepLength<L> {
     /// |x_k - r_k-1|²
@@ -74,14 +74,14 @@ impl<L: Lane> Impulse<L> {
         vec3(self.normal, self.tangent_1, self.tangent_2)
     }
 
-    /// Changes the three components.
+    /// Sets the three components.
     #[inline(always)]
     pub fn set_components(&mut self, r: Vec3<L>) {
         (self.normal, self.tangent_1, self.tangent_2) = (r.x, r.y, r.z);
     }
 }
 
-/// Goes on from `before` through `now`. Kernel `extrapolate`.
+/// Extrapolates from `before` through `now`. Kernel `extrapolate`.
 #[inline(always)]
 pub fn extrapolated<L, T>(now: T, before: T, factor: L) -> T
 where
@@ -90,7 +90,7 @@ where
     now + (now - before) * factor
 }
 
-/// Goes on with an impulse, and remembers where it was and where it begins.
+/// Extrapolates an impulse, and stores its former value and its new start.
 #[inline(always)]
 pub fn extrapolate<L: Lane>(first: bool, factor: L, impulse: Vec3<L>, step: &mut ImpulseStep<L>) -> Vec3<L> {
     let begin = if first { impulse } else { extrapolated(impulse, step.before, factor) };
@@ -98,14 +98,15 @@ pub fn extrapolate<L: Lane>(first: bool, factor: L, impulse: Vec3<L>, step: &mut
     begin
 }
 
-/// How far a sweep moved an impulse. Kernel `measure_step`.
+/// The change of an impulse in a sweep. Kernel `measure_step`.
 #[inline(always)]
 pub fn step_length<L: Lane>(impulse: Vec3<L>, step: &ImpulseStep<L>) -> StepLength<L> {
     let d = impulse - step.begin;
     StepLength { square: dot3(d, d), along: dot3(d, impulse - step.before) }
 }
 
-/// Sum of some numbers as the kernels form it: `measure_step` that of each chunk, `update_momentum` that of those.
+/// Sum of some numbers in the order of the kernels. `measure_step` sums each chunk, and `update_momentum` sums these
+/// sums.
 pub fn chunked_sum<T: Copy + Default + Add<Output = T>>(numbers: &[T]) -> T {
     let mut sums = [T::default(); WORKGROUP];
     for (i, chunk) in numbers.chunks(IMPULSES_PER_CHUNK).enumerate() {
@@ -114,7 +115,7 @@ pub fn chunked_sum<T: Copy + Default + Add<Output = T>>(numbers: &[T]) -> T {
     sum_of_halves(sums)
 }
 
-/// Sum of some numbers as a workgroup forms it: each thread takes every 64th, then halves are added.
+/// Sum of some numbers in the order of a workgroup. Each thread sums every 64th number, then halves are added.
 fn workgroup_sum<T: Copy + Default + Add<Output = T>>(numbers: &[T]) -> T {
     let mut sums = [T::default(); WORKGROUP];
     for row in numbers.chunks(WORKGROUP) {
@@ -147,7 +148,7 @@ mod tests {
         momentum.begin();
         let mut t = 1.0_f64;
         for k in 0..20 {
-            // Steps grow again at last, but none is twice the shortest.
+            // Steps grow in the second half, but none has twice the length of the shortest.
             momentum.update(step(if k < 10 { 1.0 / f64::from(1 + k) } else { 0.399 }, 0.0));
             let next = 0.5 * (1.0 + (1.0 + 4.0 * t * t).sqrt());
             assert!((momentum.t - next).abs() < 1e-12 && (momentum.factor - (t - 1.0) / next).abs() < 1e-12);
@@ -185,7 +186,7 @@ mod tests {
         assert_eq!(length, StepLength { square: 4.0, along: 6.0 });
         let back = step_length(vec3(1.5, -1.0, 0.0), &ImpulseStep { before: vec3(1.5, 2.0, 0.0), ..step });
         assert_eq!(back, StepLength { square: 4.25, along: 6.0 });
-        // Uphill: it turned round.
+        // The impulse turned back, uphill.
         let turned = step_length(vec3(1.5, 1.0, 0.0), &step);
         assert_eq!(turned.along, -0.25);
     }

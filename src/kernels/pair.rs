@@ -1,10 +1,10 @@
-//! Two bodies while one thread works on them. Doubles of `shaders/lib/pair.wgsl`.
+//! Two bodies that one thread works on. Twins of `shaders/lib/pair.wgsl`.
 
 use super::Rules;
 use super::rows::{Pair, StepParams, Sym3};
 use crate::math::{Lane, Vec3, cross3, larger, turned};
 
-/// How an impulse turns a body: its inverse inertia times the moment u.
+/// The change of a body's spin by an impulse with the moment u: its inverse inertia times u.
 #[inline(always)]
 pub fn spin_of<L: Lane>(rules: Rules, inv_inertia: Sym3<L>, u: Vec3<L>) -> Vec3<L> {
     if rules.isotropic { u * inv_inertia.x.x } else { inv_inertia.times(u) }
@@ -30,7 +30,7 @@ pub fn relative_velocity<L: Lane>(rules: Rules, pair: &Pair<L>, r_a: Vec3<L>, r_
     u
 }
 
-/// How far b at r_b moved relative to a at r_a since the step began.
+/// Movement of b at r_b relative to a at r_a since the step began.
 #[inline(always)]
 pub fn relative_movement<L: Lane>(pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) -> Vec3<L> {
     let moved_b = pair.b.dp + turned(pair.b.dq, r_b);
@@ -38,7 +38,7 @@ pub fn relative_movement<L: Lane>(pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) ->
     moved_b - moved_a
 }
 
-/// Notes that a correction was above the tolerance: an impulse, against the mass that it moved.
+/// Records whether an impulse changes a velocity by more than the tolerance. `mass` is its effective mass.
 #[inline(always)]
 pub fn note_correction<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L>, impulse: L, mass: L) {
     if rules.measured {

@@ -1,4 +1,4 @@
-//! The rows of a problem as the kernels see them: over a lane, without padding.
+//! The rows of a problem in the form that the kernels read: over a lane, without padding.
 
 use crate::math::{Lane, Quat, Scalar, Vec3};
 use crate::problem::{
@@ -7,10 +7,10 @@ use crate::problem::{
 };
 pub use crate::problem::{Mass, Sym3};
 
-/// Double of the WGSL struct `Body`.
+/// Twin of the WGSL struct `Body`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Body<L> {
-    /// Velocity of the centre of mass.
+    /// Velocity of the center of mass.
     pub v: Vec3<L>,
     /// Angular velocity.
     pub w: Vec3<L>,
@@ -20,30 +20,30 @@ pub struct Body<L> {
     pub dq: Quat<L>,
 }
 
-/// Double of the WGSL struct `Free`: velocities of a body as they would be without the impulses of this substep; with
-/// `Rules::from_start`, as they were when the step began.
+/// Velocities of a body without the impulses of this substep; with `Rules::from_start`, those when the step began. Twin
+/// of the WGSL struct `Free`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Free<L> {
-    /// Of the centre of mass.
+    /// Velocity of the center of mass.
     pub v: Vec3<L>,
     /// Angular velocity.
     pub w: Vec3<L>,
 }
 
-/// Double of the WGSL struct `Damping`.
+/// Twin of the WGSL struct `Damping`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Damping<L> {
     /// Velocity added to the plain acceleration.
     pub linear_gain: Vec3<L>,
     /// The share of the velocity that is lost.
     pub linear_loss: L,
-    /// Angular velocity added likewise.
+    /// Angular velocity added in the same way.
     pub angular_gain: Vec3<L>,
     /// The share of the angular velocity that is lost.
     pub angular_loss: L,
 }
 
-/// Double of the WGSL struct `Inertia`.
+/// Twin of the WGSL struct `Inertia`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inertia<L> {
     /// Principal moments.
@@ -54,7 +54,7 @@ pub struct Inertia<L> {
     pub frame: Quat<L>,
 }
 
-/// Double of the WGSL struct `Contact`, without the indices.
+/// Twin of the WGSL struct `Contact`, without the indices.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact<L> {
@@ -70,11 +70,11 @@ pub struct Contact<L> {
     pub radius_a: L,
     /// Radius of curvature of b's surface.
     pub radius_b: L,
-    /// How far its springs are compressed while the surfaces just touch.
+    /// Compression of its springs while the surfaces just touch.
     pub preload: L,
 }
 
-/// Double of the WGSL struct `Point`; in the order of `PointRow`, as the lanes have it in memory.
+/// Twin of the WGSL struct `Point`, in the order of `PointRow`, which lanes have in memory.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point<L> {
@@ -84,9 +84,9 @@ pub struct Point<L> {
     pub separation: L,
     /// Arm of b.
     pub r_b: Vec3<L>,
-    /// Effective mass along the normal; of a patch, about it.
+    /// Effective mass along the normal; for a patch, about the normal.
     pub normal_mass: L,
-    /// Effective mass of the tangential step.
+    /// Effective mass in the tangential plane.
     pub tangent_mass: L,
     /// Normal velocity when the step begins.
     pub approach_velocity: L,
@@ -96,7 +96,7 @@ pub struct Point<L> {
     pub slip_2: L,
 }
 
-/// Double of the WGSL struct `Joint`, without the indices.
+/// Twin of the WGSL struct `Joint`, without the indices.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Joint<L> {
@@ -110,33 +110,33 @@ pub struct Joint<L> {
     pub is_loose: L,
 }
 
-/// Double of the WGSL struct `Axis`; in the order of `AxisRow`, as the lanes have it in memory.
+/// Twin of the WGSL struct `Axis`, in the order of `AxisRow`, which lanes have in memory.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Axis<L> {
     /// Direction when the step begins.
     pub direction: Vec3<L>,
-    /// 1 to shift along it, 0 to turn about it.
+    /// 1 to shift along the axis, 0 to turn about it.
     pub is_linear: L,
-    /// Where a is when the step begins.
+    /// Position of a when the step begins.
     pub gap: L,
-    /// How far it is below its upper limit when the step begins; `NO_LIMIT` of a row that is no limit.
+    /// Distance of a from its upper limit when the step begins; `NO_LIMIT` of a row that is no limit.
     pub left: L,
-    /// The speed of its motor.
+    /// Speed of the motor.
     pub speed: L,
-    /// The largest impulse of a substep.
+    /// Largest impulse in a substep.
     pub max_impulse: L,
-    /// The speed that its spring gives in a substep by gap.
+    /// Speed in a substep over the gap.
     pub rate: L,
-    /// The share of the speed that a drive takes away.
+    /// Share of the speed that the row takes away.
     pub mass_scale: L,
-    /// The share of its impulse that a spring gives back.
+    /// Share of the impulse that a spring gives back.
     pub impulse_scale: L,
-    /// The distance of the anchors when the step begins, if the axis joins them.
+    /// Distance between the anchors when the step begins, if the axis joins them.
     pub length: L,
 }
 
-/// Double of the WGSL struct `Impulse`, in its order.
+/// Twin of the WGSL struct `Impulse`, in its order.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Impulse<L> {
@@ -150,65 +150,65 @@ pub struct Impulse<L> {
     pub peak: L,
 }
 
-/// Double of the WGSL struct `ImpulseStep`: one impulse between two accelerated sweeps.
+/// One impulse between two accelerated sweeps. Twin of the WGSL struct `ImpulseStep`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImpulseStep<L> {
-    /// After the sweep before.
+    /// Its value after the sweep before.
     pub before: Vec3<L>,
-    /// Where the sweep begins.
+    /// Its value at the start of the sweep.
     pub begin: Vec3<L>,
 }
 
-/// Double of the WGSL struct `Momentum`.
+/// Twin of the WGSL struct `Momentum`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Momentum<L> {
     /// t_k.
     pub t: L,
     /// (t_k-1 - 1)/t_k.
     pub factor: L,
-    /// The least f² since the last restart.
+    /// The smallest f² since the last restart.
     pub square: L,
-    /// How often momentum ended so far.
+    /// Number of times that momentum has ended.
     pub restarts: u32,
 }
 
-/// Double of the WGSL struct `Softness`.
+/// Twin of the WGSL struct `Softness`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SoftnessOf<L> {
-    /// Velocity wanted per overlap.
+    /// Wanted velocity over overlap.
     pub bias_rate: L,
     /// Share of the effective mass that acts.
     pub mass_scale: L,
-    /// Share of the accumulated impulse that is given back.
+    /// Share of the accumulated impulse that the contact gives back.
     pub impulse_scale: L,
-    /// Fastest that overlap is pushed out.
+    /// Largest speed at which overlap is pushed out.
     pub push_limit: L,
 }
 
-/// Double of the WGSL struct `Params`, without the counts.
+/// Twin of the WGSL struct `Params`, without the counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepParams<L> {
     /// Length of a substep.
     pub substep: L,
-    /// One over it.
+    /// One over the length of a substep.
     pub inverse_substep: L,
-    /// Approach slower than this does not bounce.
+    /// A slower approach does not bounce.
     pub restitution_threshold: L,
-    /// Contacts of two bodies that can move.
+    /// Softness of contacts between movable bodies.
     pub movable: SoftnessOf<L>,
-    /// Contacts with a body that cannot.
+    /// Softness of contacts with a body that cannot move.
     pub fixed: SoftnessOf<L>,
-    /// Joints.
+    /// Softness of joints.
     pub joint: SoftnessOf<L>,
-    /// Overlap that is left alone.
+    /// Overlap that remains.
     pub slop: L,
-    /// Factor of every correction.
+    /// Factor on every correction.
     pub relaxation: L,
-    /// Corrections that change a relative velocity by less count as none.
+    /// Corrections that change a relative velocity by less count as zero.
     pub tolerance: L,
 }
 
-/// Double of the WGSL struct `Pair`: two bodies while one thread works on them.
+/// Two bodies that one thread works on. Twin of the WGSL struct `Pair`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pair<L> {
     /// The body that the normal points away from.
@@ -219,9 +219,9 @@ pub struct Pair<L> {
     pub mass_a: Mass<L>,
     /// Mass of b.
     pub mass_b: Mass<L>,
-    /// Velocities of a when the step began, if those of `a` are changes since.
+    /// Velocities of a when the step began, if the velocities in `a` are changes.
     pub start_a: Free<L>,
-    /// Velocities of b when the step began.
+    /// The same for b.
     pub start_b: Free<L>,
     /// 1 once a correction was above the tolerance.
     pub moving: L,
@@ -231,12 +231,12 @@ pub struct Pair<L> {
 macro_rules! stored {
     ($($Kernel:ident as $Row:ident { $($Type:ident: $($field:ident),+;)* [$($number:ident),*] $($same:ident)? })*) => {$(
         impl<S: Scalar> $Kernel<S> {
-            /// From storage.
+            /// Loads a row from storage.
             pub fn load(r: &$Row) -> Self {
                 Self { $($($field: $Type::load(r.$field),)+)* $($number: S::from(r.$number),)* $($same: r.$same)? }
             }
 
-            /// To storage, without indices.
+            /// Stores a row, without indices.
             #[allow(clippy::needless_update)]
             pub fn store(&self) -> $Row {
                 $Row {
@@ -267,7 +267,7 @@ stored! {
 }
 
 impl<S: Scalar> Mass<S> {
-    /// From storage.
+    /// Loads a row from storage.
     pub fn load(r: &MassRow) -> Self {
         Self {
             inv_inertia: Sym3 { x: Vec3::load(r.inv_inertia_x), yz: Vec3::load(r.inv_inertia_yz) },
@@ -276,7 +276,7 @@ impl<S: Scalar> Mass<S> {
         }
     }
 
-    /// To storage.
+    /// Stores a row.
     pub fn store(&self) -> MassRow {
         MassRow {
             inv_inertia_x: self.inv_inertia.x.store(),
@@ -292,7 +292,7 @@ impl<S: Scalar> Mass<S> {
 macro_rules! constants {
     ($($Kernel:ident as $Row:ident { [$($number:ident),*] $($softness:ident),* })*) => {$(
         impl<L: Lane> $Kernel<L> {
-            /// From storage, the same in every lane.
+            /// Loads the numbers from storage, the same in every lane.
             #[inline(always)]
             pub fn load(r: &$Row) -> Self {
                 Self {
@@ -309,7 +309,7 @@ constants! {
 }
 
 impl<L: Lane> StepParams<L> {
-    /// From storage, the same in every lane.
+    /// Loads the numbers from storage, the same in every lane.
     #[inline(always)]
     pub fn load(p: &Params, s: &Substep) -> Self {
         Self {

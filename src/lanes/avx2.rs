@@ -11,8 +11,8 @@ use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 #[repr(C, align(64))]
 pub struct Avx2([__m256; 2]);
 
-// SAFETY of this module: every intrinsic here needs AVX2 and nothing else, and the type is only used where that has been
-// detected; aligned loads and stores go through `Wide` and `Row8`, which are aligned to 32 bytes.
+// SAFETY of this module: every intrinsic here needs AVX2 and nothing else, and the type is only used where that has
+// been detected; aligned loads and stores go through `Wide` and `Row8`, which are aligned to 32 bytes.
 
 /// An intrinsic for both registers.
 macro_rules! both {

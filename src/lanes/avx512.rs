@@ -11,8 +11,8 @@ use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 #[repr(transparent)]
 pub struct Avx512(__m512);
 
-// SAFETY of this module: every intrinsic here needs AVX-512F and nothing else, and the type is only used where that has been
-// detected; aligned loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32.
+// SAFETY of this module: every intrinsic here needs AVX-512F and nothing else, and the type is only used where that has
+// been detected; aligned loads and stores go through `Wide`, which is aligned to 64 bytes, and `Row8`, to 32.
 
 lane! {
     Avx512, __mmask16, |a, b, m|

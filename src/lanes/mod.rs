@@ -95,7 +95,8 @@ pub fn columns<L: Lanes, T: bytemuck::Pod>(all: &[T], row: usize, which: &[u32; 
         *place *= (size_of::<T>() / 8) as u32;
     }
     assert!((last as usize) < all.len());
-    // SAFETY: each `T` consists of whole rows of numbers, has one of this number, and is one of `all`, which nothing writes meanwhile.
+    // SAFETY: each `T` consists of whole rows of numbers and has a row with this number. `places` are offsets of
+    // elements of `all`, which is borrowed, so nothing writes it meanwhile.
     unsafe { L::gathered(all.as_ptr().cast::<Row8>().add(row), &places) }
 }
 

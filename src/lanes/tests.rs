@@ -1,4 +1,4 @@
-//! Every instruction set does to sixteen numbers what Rust does to one, the odd ones included.
+//! Checks that every instruction set has the results of plain Rust numbers, including special values.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use super::{InstructionSet, Lanes, Row8, WIDTH, Wide, Work};
 use crate::math::Lane;
 
-/// Zeros of both signs, the smallest and the largest, and what is no number.
+/// Zeros of both signs, the smallest and the largest numbers, infinities and NaN.
 const NUMBERS: [f32; WIDTH] = [
     0.0,
     -0.0,
@@ -26,11 +26,11 @@ const NUMBERS: [f32; WIDTH] = [
     1e20,
 ];
 
-/// What a lane does to two numbers, over any kind of lane.
+/// The results of lane operations on two numbers, for any kind of lane.
 fn done<L: Lane>(a: L, b: L) -> [L; 11] {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let chosen = |mask: L::Mask| L::select(zero, one, mask);
-    // Of numbers whose inverse square root is asked for.
+    // Only positive numbers have an inverse square root.
     let positive = L::larger(a * a, L::constant(1e-30));
     [
         a + b,
@@ -47,7 +47,7 @@ fn done<L: Lane>(a: L, b: L) -> [L; 11] {
     ]
 }
 
-/// The same over sixteen at a time, and to rows and back.
+/// The same for sixteen numbers at a time, with conversion to rows and back.
 struct Sixteen {
     a: Wide,
     b: Wide,
@@ -60,7 +60,7 @@ impl Work for Sixteen {
     #[inline(always)]
     fn over<L: Lanes>(&self, _: Range<usize>) {
         let numbers = done(L::load(&self.a), L::load(&self.b));
-        // SAFETY: the places are those of rows.
+        // SAFETY: `places` has offsets of rows in `rows`.
         let columns = unsafe { L::gathered(self.rows.as_ptr(), &self.places) };
         let (a, b) = (L::load(&self.a), L::load(&self.b));
         let exact = [a.sqrt(), a.divided_by(b), a.with_sign(b), a.floats_below(4)];
@@ -74,7 +74,7 @@ impl Work for Sixteen {
 
 fn sixteen(a: Wide, b: Wide) -> Sixteen {
     let rows: Vec<Row8> = (0..40).map(|row| Row8([0, 1, 2, 3, 4, 5, 6, 7].map(|k| (8 * row + k) as f32))).collect();
-    // A row is four times eight bytes.
+    // The unit is 8 bytes, and a row has four of them.
     let places = std::array::from_fn(|lane| 4 * ((7 * lane as u32 + 3) % 40));
     Sixteen { a, b, rows, places, results: Mutex::default() }
 }

@@ -22,17 +22,17 @@ pub enum Kernel {
     EndChanges,
     /// Torques; over bodies.
     IntegrateTorques {
-        /// Like in `IntegrateVelocities`.
+        /// As in `IntegrateVelocities`.
         from_start: bool,
     },
     /// Decay of velocities; over bodies.
     DampVelocities {
-        /// As of `IntegrateVelocities`.
+        /// As in `IntegrateVelocities`.
         from_start: bool,
     },
     /// Free rotation of unequal moments of inertia; over `inertias`.
     IntegrateGyroscopic {
-        /// Like in `IntegrateVelocities`.
+        /// As in `IntegrateVelocities`.
         from_start: bool,
     },
     /// Clears impulses; over contact colors, all at once.
@@ -44,7 +44,7 @@ pub enum Kernel {
     },
     /// The same; over joint colors, all at once.
     SumJointImpulses {
-        /// Like in `SumImpulses`.
+        /// As in `SumImpulses`.
         first: bool,
     },
     /// Rotates the inertia of bodies; over `turning`.
@@ -89,7 +89,7 @@ pub enum Kernel {
     SolveContacts(Rules),
     /// Integrates poses; over bodies.
     IntegratePositions {
-        /// Like in `IntegrateVelocities`.
+        /// As in `IntegrateVelocities`.
         from_start: bool,
     },
     /// Applies restitution; over contact colors.

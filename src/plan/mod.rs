@@ -1,8 +1,8 @@
 //! The order of work as data: the sequence of kernels and their ranges.
 //!
-//! A plan is built once a step from the settings and the problem, and backends only follow it: the algorithm is here
-//! and nowhere else. A plan has no pass for a feature that its scene lacks. Without friction no kernel has friction,
-//! and without restitution, torques, damping, unequal moments of inertia or joints there are no passes for them.
+//! A plan is built once per step from the settings and the problem. Backends only follow it, so the algorithm is
+//! nowhere else. A plan has no pass for a feature that its scene lacks. Without friction no kernel has friction, and
+//! without restitution, torques, damping, unequal moments of inertia or joints there are no passes for them.
 
 mod bytes;
 mod kernel;
@@ -314,7 +314,7 @@ impl StepPlan {
     /// together; chain 3 + 0 and 3), and one kernel would have to process both.
     ///
     /// With a tolerance, `begin_sweep` runs before every sweep. It leaves a flag in a buffer, and a sweep that is no
-    /// longer needed is skipped: nothing is read back. A pile of 500 with up to 16 sweeps a substep and 1e-2 m/s took
+    /// longer needed is skipped: nothing is read back. A pile of 500 with up to 16 sweeps per substep and 1e-2 m/s took
     /// 0.66 of the time of all 16 on a software adapter and 0.23 on the reference. Indirect dispatch is not used: each
     /// such call adds a validating dispatch of its own, which costs about as much as the empty one that it saves.
     fn sweeps(&mut self, sweeps: Sweeps, rules: Rules) {

@@ -1,5 +1,5 @@
-//! How the rows of a contact follow from its manifold and from the masses and poses of its bodies. The functions of effective masses are the
-//! doubles of `shaders/lib/prepare.wgsl`; separations are computed by the processor alone.
+//! The rows of a contact, from its manifold and from the masses and poses of its bodies. The functions of effective
+//! masses are the twins of `shaders/lib/prepare.wgsl`. Only the processor computes separations.
 
 use crate::math::{Lane, NormalMovement, Quat, Vec3, cross3, dot3, reciprocal, vec3};
 
@@ -13,7 +13,7 @@ pub struct Sym3<L> {
 }
 
 impl<L: Lane> Sym3<L> {
-    /// Double of `inv_inertia_times`.
+    /// Twin of `inv_inertia_times`.
     #[inline(always)]
     pub fn times(self, u: Vec3<L>) -> Vec3<L> {
         let (p, q) = (self.x, self.yz);
@@ -21,7 +21,7 @@ impl<L: Lane> Sym3<L> {
     }
 }
 
-/// Double of the WGSL struct `Mass`.
+/// Twin of the WGSL struct `Mass`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mass<L> {
     /// Inverse inertia, world axes.
@@ -32,22 +32,22 @@ pub struct Mass<L> {
     pub acceleration: Vec3<L>,
 }
 
-/// Friction up to which no solid of even density jams. A point at the lever r from the center of such a solid has m r²/I <= 15, and friction
-/// below 2/√14 jams no point with that (docs/derivation.md, section 6).
+/// No solid of even density jams with friction up to this. A point at the distance r from the center of such a solid
+/// has m r²/I <= 15, and with that ratio friction below 8/15 jams no point (docs/derivation.md, section 6).
 pub const LEAST_JAMMING: f32 = 0.53;
 
-/// One over x, to half an ulp for most x; 0 where x is not positive.
+/// 1/x, to half an ulp for most x; 0 if x is not positive.
 #[inline(always)]
 pub fn inverse_or_zero<L: Lane>(x: L) -> L {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let is_positive = x.gt(zero);
     let x = L::select(one, x, is_positive);
     let y = reciprocal(x);
-    // One step of Newton's method more: powers of two are exact.
+    // One more step of Newton's method makes the inverses of powers of two exact.
     L::select(zero, y + y * (one - x * y), is_positive)
 }
 
-/// The square root of x; 0 where x is below 1e-30.
+/// The square root of x; 0 if x is not above 1e-30.
 #[inline(always)]
 pub fn square_root<L: Lane>(x: L) -> L {
     let is_normal = x.gt(L::constant(1e-30));
@@ -55,7 +55,7 @@ pub fn square_root<L: Lane>(x: L) -> L {
     L::select(L::constant(0.0), x * x.inverse_sqrt(), is_normal)
 }
 
-/// A unit vector across a unit normal (Duff et al., "Building an orthonormal basis, revisited", 2017).
+/// A unit vector perpendicular to a unit normal (Duff et al., "Building an orthonormal basis, revisited", 2017).
 #[inline(always)]
 pub fn tangent_of<L: Lane>(n: Vec3<L>) -> Vec3<L> {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
@@ -64,7 +64,7 @@ pub fn tangent_of<L: Lane>(n: Vec3<L>) -> Vec3<L> {
     vec3(n.x * n.y * a, sign + n.y * n.y * a, -n.y)
 }
 
-/// Share of one body in the entry (d, e) of G M⁻¹ Gᵀ at the arm r.
+/// Contribution of one body to the entry (d, e) of G M⁻¹ Gᵀ at the arm r.
 #[inline(always)]
 fn entry_of<L: Lane>(mass: &Mass<L>, r: Vec3<L>, d: Vec3<L>, e: Vec3<L>) -> L {
     mass.inv_mass * dot3(d, e) + dot3(cross3(r, d), mass.inv_inertia.times(cross3(r, e)))
@@ -76,10 +76,11 @@ pub fn entry<L: Lane>(a: &Mass<L>, b: &Mass<L>, r_a: Vec3<L>, r_b: Vec3<L>, d: V
     entry_of(a, r_a, d, e) + entry_of(b, r_b, d, e)
 }
 
-/// One over the largest eigenvalue of the tangential block with the entries s_11, s_22 and s_12; 0 for no block.
+/// One over the largest eigenvalue of the tangential block with the entries s_11, s_22 and s_12; 0 if the block is
+/// zero.
 #[inline(always)]
 pub fn tangent_mass<L: Lane>(s_11: L, s_22: L, s_12: L) -> L {
-    // Squares of a light body's entries would leave single precision.
+    // The squares of the entries of a light body would leave single precision.
     let scale = (s_11 + s_22).inverse_power();
     let (s_11, s_22, s_12) = (s_11 * scale, s_22 * scale, s_12 * scale);
     let apart = s_11 - s_22;
@@ -87,9 +88,10 @@ pub fn tangent_mass<L: Lane>(s_11: L, s_22: L, s_12: L) -> L {
     scale * inverse_or_zero(L::constant(0.5) * (s_11 + s_22 + root))
 }
 
-/// The largest change of the normal velocity by friction, for a normal impulse of 1, over that by the impulse itself. Where the ratio is above 1,
-/// friction that slides can press the surfaces together faster than the normal impulse parts them (Painlevé). The entries are those of the
-/// normal, and of the normal with each tangent.
+/// The ratio of two changes of the normal velocity by a unit normal impulse: the largest change by its friction, over
+/// the change by the impulse itself. Above a ratio of 1, sliding friction can press the surfaces together faster than
+/// the normal impulse parts them (Painlevé). `parted` is the normal entry, and `pressed_1` and `pressed_2` are the
+/// entries of the normal with each tangent. The ratio is 0 for friction up to [`LEAST_JAMMING`].
 #[inline(always)]
 pub fn jamming<L: Lane>(friction: L, parted: L, pressed_1: L, pressed_2: L) -> L {
     let scale = parted.inverse_power();
@@ -99,15 +101,15 @@ pub fn jamming<L: Lane>(friction: L, parted: L, pressed_1: L, pressed_2: L) -> L
     L::select(L::constant(0.0), ratio, friction.gt(L::constant(LEAST_JAMMING.into())))
 }
 
-/// The share of a normal step that is taken. Normal impulse and friction in turn swing about their solution where friction lifts more than the
-/// impulse does. Shorter steps end that.
+/// The share of a normal step that a sweep takes. If friction changes the normal velocity more than the normal impulse
+/// does, full steps of the two in turn oscillate about the solution. Shorter steps of the impulse end the oscillation.
 #[inline(always)]
 pub fn normal_step<L: Lane>(jamming: L) -> L {
     let one = L::constant(1.0);
     L::select(one, inverse_or_zero(one + jamming), jamming.gt(one))
 }
 
-/// One over the inverse inertia of both bodies about the normal.
+/// One over the sum of the inverse inertias of both bodies about the normal.
 #[inline(always)]
 pub fn twist_mass<L: Lane>(n: Vec3<L>, a: &Mass<L>, b: &Mass<L>) -> L {
     inverse_or_zero(dot3(n, a.inv_inertia.times(n)) + dot3(n, b.inv_inertia.times(n)))
@@ -127,16 +129,16 @@ pub struct Frame<L> {
 /// The effective masses of a contact point, and how far it jams.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PointMasses<L> {
-    /// Along the normal, shortened where the point jams.
+    /// Along the normal; smaller if the point jams.
     pub normal: L,
-    /// Of the tangential step.
+    /// In the tangential plane.
     pub tangent: L,
-    /// [`jamming`].
+    /// The ratio of [`jamming`].
     pub jamming: L,
 }
 
-/// The effective masses of a point at the arms `r_a` and `r_b`. `tangents`: friction has two directions. `jams`: a surface has friction above
-/// [`LEAST_JAMMING`].
+/// The effective masses of a point at the arms `r_a` and `r_b`. `tangents`: friction has two directions. `jams`: some
+/// surface has more friction than [`LEAST_JAMMING`].
 #[inline(always)]
 pub fn point_masses<L: Lane>(
     tangents: bool,
@@ -163,7 +165,7 @@ pub fn point_masses<L: Lane>(
     masses
 }
 
-/// Where a body is: its center of mass, and its rotation.
+/// Place of a body: its center of mass and its rotation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pose<L> {
     /// Center of mass.
@@ -172,14 +174,15 @@ pub struct Pose<L> {
     pub rotation: Quat<L>,
 }
 
-/// The rotation from `then` to `now`. That of a body that did not turn moves no arm, to the bit.
+/// The rotation from `then` to `now`. Its axis is exactly zero if the two are equal.
 #[inline(always)]
 pub fn turn_since<L: Lane>(now: Quat<L>, then: Quat<L>) -> Quat<L> {
     let axis = (now.axis * then.w - then.axis * now.w) - cross3(now.axis, then.axis);
     Quat { axis, w: now.w * then.w + dot3(now.axis, then.axis) }
 }
 
-/// How the bodies at the poses `a` and `b` moved along a normal since b was at `apart` from a, and they had the rotations `then`.
+/// Movement of two bodies along a normal since their manifold was computed. `a` and `b` are their poses now. The center
+/// of b was then at `apart` from that of a, and `then` holds their rotations.
 #[inline(always)]
 pub fn movement_since<L: Lane>(
     normal: Vec3<L>,
@@ -236,7 +239,7 @@ mod tests {
         assert_eq!([0.0, 1e-38].map(square_root::<f32>), [0.0; 2]);
     }
 
-    /// Contacts of boxes on planes have the axes of the world.
+    /// Contacts of boxes on planes have tangents along the axes of the world.
     #[test]
     fn tangents_across_the_axes_are_axes_and_all_are_unit_vectors_across() {
         for n in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0_f32]] {

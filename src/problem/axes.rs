@@ -1,14 +1,15 @@
-//! The rows of the axes of joints: from a joint, and how it stands when the step begins.
+//! The rows of the axes of joints, from the joint and its position when the step begins.
 //!
-//! A spring of frequency w/2 pi and damping ratio z, on what moves with an effective mass m, would change its coordinate x in a substep h by
-//! a turn in phase space with the determinant exp(-2 z w h). With a = z w h the law
+//! In a substep h, a spring of frequency w/2 pi and damping ratio z, on an effective mass m, turns the state (x, v) in
+//! phase space. The determinant of the exact map is exp(-2 z w h). With a = z w h the law
 //!
 //! ```text
 //! v' = s v - r x,   x' = x + h v',   s = 1 / (1 + 2 a + 2 a²),   r = w² h / (1 + a + a²/2)
 //! ```
 //!
-//! has that determinant to the third order in a and that period to the second order in w h: a spring without damper keeps its energy. A row
-//! holds 1 - s as the share of the speed that is taken away, s as the share of the impulse that is given back, and r (docs/derivation.md).
+//! has this determinant to the third order in a, and the period of the spring to the second order in w h. A spring
+//! without damper keeps its energy. A row holds the share 1 - s of the speed that the spring takes away, the share s of
+//! the impulse that it gives back, and r (docs/derivation.md).
 
 use std::f32::consts::{PI, TAU};
 
@@ -20,31 +21,32 @@ use super::softness::softness;
 use super::{NodeRow, StepProblem};
 use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear, World};
 
-/// Springs that turn by more than this in a substep (rad) are integrated implicitly, which takes energy: several of them on one body would gain
-/// some otherwise.
+/// The solver integrates springs that turn by more than this in a substep (rad) implicitly, which takes energy away.
+/// Otherwise several such springs on one body would gain energy.
 const STIFFEST: f32 = 0.5;
 
-/// The axes of a joint that may have rows, by their numbers: 0 to 2 to shift along, 3 to 5 to turn about.
+/// The axes of a joint that may have rows, by their numbers: 0 to 2 for shifts, 3 to 5 for turns.
 fn axes_of(joint: &Joint) -> impl Iterator<Item = (usize, &Axis)> {
     let linear = if joint.holds_anchors() { &[] } else { joint.linear_axes() };
     linear.iter().enumerate().chain((3..).zip(&joint.angular))
 }
 
-/// The rows that a joint has: the number of an axis, and whether the row is that of its drive. Drives give way to bounds and stand before
-/// them.
+/// The rows of a joint: the number of an axis, and whether the row is that of its drive. Drives come first, so that
+/// bounds win over them.
 pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
     let drives = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && axis.bounds != Bounds::Locked);
     let bounds = axes_of(joint).filter(|(_, axis)| axis.bounds != Bounds::Free);
     drives.map(|(i, _)| (i, true)).chain(bounds.map(|(i, _)| (i, false)))
 }
 
-/// How many rows of a joint are of drives; they stand before the others.
+/// Number of rows of drives of a joint. They come before the other rows.
 pub fn drive_count(joint: &Joint) -> usize {
     kinds(joint).filter(|(_, is_drive)| *is_drive).count()
 }
 
-/// The most force of the drives of a joint as it stands (N): that of a motor, and what the deflection of a spring gives. What turns pushes at the
-/// smallest half extent of body a.
+/// The largest total force of the drives of a joint in its present position (N). A motor counts with its largest load,
+/// and a spring with the load of its deflection. The torque of a drive counts as a force at the smallest half extent of
+/// body a.
 pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
     if axes_of(joint).all(|(_, axis)| axis.drive == Drive::None) {
         return 0.0;
@@ -76,8 +78,9 @@ pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
     axes_of(joint).map(load).sum()
 }
 
-/// The rows of the nodes that a joint has where it is solved at once with others ([`NodeRow::rows`]): its locks and limits to turn about, which
-/// give a lever its stiffness, before those to shift along. A point that is locked by equal limits and driven is swept.
+/// The rows of the nodes of a joint that is solved directly ([`NodeRow::rows`]). Locks and limits of turns come before
+/// those of shifts, because they give a lever its stiffness. An axis that equal limits lock, and that has a drive, is
+/// swept.
 pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {
     let is_limit = |axis: &Axis| match axis.bounds {
         Bounds::Locked => Some(false),
@@ -95,7 +98,7 @@ pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {
     [bounds(true), shifts].into_iter().filter(|rows| *rows > 0)
 }
 
-/// The same angle, by whole turns as near to another one as it can be (rad); both are within -pi and pi.
+/// The same angle plus whole turns, as near as possible to another angle (rad). Both are within -pi and pi.
 fn nearest(angle: f32, to: f32) -> f32 {
     match angle - to {
         apart if apart > PI => angle - TAU,
@@ -104,13 +107,13 @@ fn nearest(angle: f32, to: f32) -> f32 {
     }
 }
 
-/// Writes the rows of a joint for substeps of `substep` seconds. `limit_rate` is the share of the way beyond a limit that an axis with a drive
-/// goes back (1/s).
+/// Writes the rows of a joint for substeps of `substep` seconds. An axis with a drive that is beyond a limit goes back
+/// by the share `limit_rate` of the excess per second (1/s).
 pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rate: f32, rows: &mut Vec<AxisRow>) {
     let is_distance = matches!(joint.linear, Linear::Distance(_));
     for (i, is_drive) in kinds(joint) {
         let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
-        // An angle that passed pi goes on beyond: a turn less is no other place.
+        // An angle continues beyond pi. The same angle less a turn would be another position.
         let middle = match (is_drive, axis.drive, axis.bounds) {
             (true, Drive::Spring { target, .. } | Drive::SpringDamper { target, .. }, _) => target,
             (false, _, Bounds::Between { min, max }) => 0.5 * (min + max),
@@ -128,7 +131,8 @@ pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rat
         rows.push(if is_drive {
             driven(row, axis.drive, position, substep)
         } else {
-            // A soft limit would give way to the load of a drive, which a rigid one takes back in the same sweep.
+            // A soft limit would yield to the load of a drive. A rigid limit takes this load back within the same
+            // sweep.
             let is_pushed = axis.drive != Drive::None && axis.bounds != Bounds::Locked;
             let row = if is_pushed { AxisRow { rate: limit_rate, mass_scale: 1.0, ..row } } else { row };
             bounded(row, axis.bounds, position)
@@ -156,7 +160,7 @@ fn driven(row: AxisRow, drive: Drive, position: f32, h: f32) -> AxisRow {
             let (gap, mass_scale) = (position - target, 1.0 - impulse_scale);
             AxisRow { gap, rate, mass_scale, impulse_scale, max_impulse: largest(max_load, h), ..row }
         }
-        // What it moves is known once all masses are: [`tune`].
+        // [`tune`] completes the row once all masses are known.
         Drive::SpringDamper { target, max_load, .. } => {
             AxisRow { gap: position - target, impulse_scale: 1.0, max_impulse: largest(max_load, h), ..row }
         }
@@ -164,13 +168,13 @@ fn driven(row: AxisRow, drive: Drive, position: f32, h: f32) -> AxisRow {
     }
 }
 
-/// Whether a joint has springs with constants of their own.
+/// Whether a joint has springs with a stiffness and damping of their own.
 pub(super) fn has_spring_dampers(joint: &Joint) -> bool {
     axes_of(joint).any(|(_, axis)| matches!(axis.drive, Drive::SpringDamper { .. }))
 }
 
-/// Completes the rows of springs with constants of their own, for substeps of `substep` seconds: on what they move now,
-/// they are springs of the frequency √(k/m)/2π and the damping ratio c/2√(k m).
+/// Completes the rows of springs with a stiffness k and damping c of their own, for substeps of `substep` seconds. With
+/// the present effective mass m, such a spring has the frequency √(k/m)/2π and the damping ratio c/2√(k m).
 pub(super) fn tune(joint: &Joint, number: usize, substep: f32, problem: &mut StepProblem) {
     let row = problem.joints[number];
     let first = row.first_axis as usize;
@@ -203,7 +207,7 @@ fn largest(max_load: f32, h: f32) -> f32 {
     (max_load * h).min(f32::MAX)
 }
 
-/// The speed that a spring gives by gap in a substep, and the share of its impulse that it gives back.
+/// The speed that a spring gives in a substep, over its gap, and the share of its impulse that it gives back.
 fn spring(frequency: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
     let omega = TAU * frequency;
     if omega * h > STIFFEST {
@@ -218,7 +222,7 @@ fn spring(frequency: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
 mod tests {
     use super::*;
 
-    /// The eigenvalues of the law of a spring are those of the motion that it stands for.
+    /// The eigenvalues of the law of a spring are those of the exact motion.
     #[test]
     fn a_spring_has_its_period_and_its_decay() {
         let h = 1.0 / 480.0;

@@ -13,23 +13,24 @@ use crate::effort::Effort;
 use crate::graph::Coloring;
 use crate::world::{BodyKind, World};
 
-/// Islands that take substeps of one length, by their colors, 104 B. No constraint holds bodies of two blocks that can move.
+/// Islands that take substeps of one length, by their colors, 104 B. No constraint connects movable bodies of two
+/// blocks.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Block {
-    /// Substeps of a step.
+    /// Substeps in a step.
     pub substeps: u32,
-    /// The length of one, and what follows from it.
+    /// Length of a substep, and the coefficients that follow from it.
     pub substep: Substep,
     /// First color of the contacts, and one past the last.
     pub contacts: [u32; 2],
-    /// The first of those colors whose contacts are struck, and whose points are solved together.
+    /// The first color of struck contacts, whose points are solved together.
     pub struck: u32,
-    /// The first of those colors whose contacts jam, and are swept several times each.
+    /// The first color of contacts that jam, which are swept several times each.
     pub jamming: u32,
     /// First color of the joints, and one past the last.
     pub joints: [u32; 2],
-    /// The first of those colors whose joints are solved at once and not swept.
+    /// The first color of joints that are solved directly and not swept.
     pub direct: u32,
     /// The color of the bodies.
     pub bodies: u32,
@@ -42,8 +43,8 @@ pub struct Block {
 }
 
 impl Block {
-    /// The colors of its contacts, its joints, its bodies, its rows of unequal moments of inertia, its systems of joints and its rows of
-    /// turning inertia.
+    /// The colors of the six kinds of rows: contacts, joints, bodies, rows of unequal moments of inertia, systems of
+    /// joints, and rows of turning inertia.
     pub fn colors(&self) -> [Range<u32>; 6] {
         let ([c, c_end], [j, j_end]) = (self.contacts, self.joints);
         let [bodies, inertias, systems, turning] =
@@ -51,7 +52,7 @@ impl Block {
         [c..c_end, j..j_end, bodies, inertias, systems, turning]
     }
 
-    /// Colors of the contacts that are swept once, of those that are struck, and of those that jam.
+    /// The colors of contacts that are swept once, of struck contacts, and of contacts that jam.
     pub fn contacts_by_kind(&self) -> [Range<u32>; 3] {
         let [first, end] = self.contacts;
         [first..self.struck, self.struck..self.jamming, self.jamming..end]
@@ -62,14 +63,14 @@ impl Block {
         self.joints[0]..self.direct
     }
 
-    /// Colors of the joints that are solved at once.
+    /// Colors of the joints that are solved directly.
     pub fn direct_joints(&self) -> Range<u32> {
         self.direct..self.joints[1]
     }
 }
 
-/// Lays out the rows that passes go over, after all rows are written: contacts, joints, bodies, rows of inertia, systems of joints and rows
-/// of turning inertia, each block by block.
+/// Lays out the rows that passes go over, after all rows are written: contacts, joints, bodies, rows of inertia,
+/// systems of joints, and rows of turning inertia. Each kind goes block by block.
 pub fn lay_out(
     world: &World,
     asleep: &[bool],
@@ -121,7 +122,7 @@ pub fn lay_out(
             (block.contacts, block.struck, block.jamming) = ([first, end], struck, jamming);
         }
     }
-    // The bodies of a joint that can move are of one island, and those of a system.
+    // The movable bodies of a joint, or of a system, belong to one island.
     let is_of = |joint: u32, block: usize| {
         let row = &joint_rows[joint as usize];
         takes_part(world, asleep, joint) && block_of_pair([row.body_a, row.body_b]) == block
@@ -151,14 +152,15 @@ pub fn lay_out(
     }
 }
 
-/// Makes a color of some rows; returns its number.
+/// Makes a color of some rows, and returns its number.
 fn push_color(order: &mut Vec<u32>, colors: &mut Vec<u32>, rows: impl Iterator<Item = u32>) -> u32 {
     order.extend(rows);
     colors.push(order.len() as u32);
     colors.len() as u32 - 2
 }
 
-/// Adds the colors of a coloring that have wanted rows, with these rows only; returns the first of them and one past the last.
+/// Adds the wanted rows of a coloring, color by color, and leaves out colors without any. Returns the first color and
+/// one past the last.
 fn deal_colors(
     coloring: &Coloring,
     order: &mut Vec<u32>,

@@ -1,4 +1,4 @@
-//! The rows of bodies: from a world, and back to it.
+//! The rows of bodies, written from a world and stored back into it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -12,10 +12,10 @@ use crate::math::Lane;
 use crate::math::rotation::{product, unit};
 use crate::world::{Body, BodyKind, World};
 
-/// Bodies that one task works on at least.
+/// Least number of bodies in one task.
 pub(super) const LEAST_BODIES: usize = 256;
 
-/// Begins the problem of a step of `dt` seconds: what is the same for all, and the rows of bodies. Bodies that are `asleep` stand there as
+/// Begins the problem of a step with the parameters and the rows of bodies. Bodies that are `asleep` get the rows of
 /// bodies that nothing moves.
 pub fn begin(world: &World, asleep: &[bool], config: &SolverConfig, problem: &mut StepProblem) {
     write_bodies(world, asleep, config, problem);
@@ -80,7 +80,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: 
     }
 }
 
-/// How hard a body is to move that can be pushed.
+/// Inverse mass and inertia of a body that can be pushed.
 pub(super) fn mass_row(body: &Body) -> MassRow {
     let i = body.world_inverse_inertia();
     MassRow {
@@ -91,8 +91,8 @@ pub(super) fn mass_row(body: &Body) -> MassRow {
     }
 }
 
-/// Writes poses and velocities into the world, but for bodies that are asleep. Impulses stay in their rows, where the next step
-/// finds them.
+/// Writes poses and velocities into the world, except for bodies that are asleep. Impulses stay in their rows for the
+/// next step.
 pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
     let bodies = world.bodies.as_mut_slice().par_iter_mut().with_min_len(LEAST_BODIES).zip(&problem.bodies);
     bodies.enumerate().for_each(|(i, (body, row))| {

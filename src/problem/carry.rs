@@ -1,8 +1,8 @@
-//! How the rows of contacts follow from those of the step before, for a backend that keeps them on a device.
+//! Changes of the rows of contacts since the step before, for a backend that keeps the rows on a device.
 //!
-//! The rows that a step leaves behind stay where they are, impulses and preloads with them, and nothing of that travels. Only manifolds
-//! that were computed since are sent, with the points that their impulses belonged to, and how far the surfaces of all are apart now. The
-//! device computes the rows from them. The host computes the same rows, so that nothing is lost with the device.
+//! The rows of a step stay on the device, with their impulses and preloads. The host sends only the manifolds that it
+//! computed since, the former points of their impulses, and the present separations of all contacts. The device
+//! computes the rows from them. The host computes the same rows, so that nothing is lost with the device.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -11,12 +11,12 @@ use crate::math::{Lane, smaller};
 /// The changes since the last step, for a backend that has the rows of that step.
 #[derive(Debug, Default, PartialEq)]
 pub struct Carry {
-    /// Whether the device goes on from the rows of the step before. Else nothing else here counts. The problem is complete either way, so
-    /// that a backend without these rows can run the step instead.
+    /// Whether the device continues from the rows of the step before. If not, the other fields mean nothing. The
+    /// problem is complete either way, so a backend without these rows can run the step.
     pub on_device: bool,
-    /// The contacts whose rows were written again since, ascending.
+    /// The contacts whose rows were written again since, in ascending order.
     pub written: Vec<Written>,
-    /// Whether more than the separations of reused points follows the bodies: the velocity of an approach, the slip.
+    /// Whether approach velocities and slips of reused points also follow the bodies, besides their separations.
     pub approach: bool,
     /// Whether friction at points has two directions.
     pub tangents: bool,
@@ -32,11 +32,12 @@ crate::saved::cloned!(Carry { on_device, written, approach, tangents, preload })
 pub struct Written {
     /// Its row.
     pub row: u32,
-    /// Which of the points that the row had each point is, [`NO_POINT`] for none; [`Written::NEW`] if the row begins without impulses.
+    /// For each point, the index that it had in the row before, or [`NO_POINT`] for a new point; [`Written::NEW`] if
+    /// the row begins without impulses.
     pub points_before: [u8; 4],
 }
 
-/// A point that is new.
+/// The index of a new point.
 pub const NO_POINT: u8 = 4;
 
 impl Written {
@@ -48,23 +49,24 @@ impl Written {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Preload {
-    /// Overlap at rest per impulse of a substep, times the effective mass, of contacts between bodies that can move (s).
+    /// Ratio of the overlap at rest to the impulse of a substep, times the effective mass, for contacts between movable
+    /// bodies (s).
     pub movable_compliance: f32,
-    /// The same of contacts with bodies that cannot (s).
+    /// The same for contacts with bodies that cannot move (s).
     pub fixed_compliance: f32,
-    /// Share of what is missing that preloads gain in this step.
+    /// Share of the missing preload that is added in this step.
     pub share: f32,
-    /// 1 if impulses are carried over, 0 if every step begins without.
+    /// 1 if impulses are carried over, 0 if every step begins without them.
     pub warm_start: u32,
 }
 
-/// Most that a contact is preloaded, relative to the overlap at rest of what it bears.
+/// Largest preload of a contact, relative to its overlap at rest under its load.
 pub(super) const LARGEST_PRELOAD: f64 = 2.0;
 
 impl Preload {
-    /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m). The
-    /// contact is one of two bodies that can move, or of one that cannot with one that can; the length of its substeps over that of
-    /// class 0 is `share`. Double of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
+    /// Compression of the springs of a contact at rest under the normal impulses `pressed`, times their effective mass
+    /// (kg m). `both_movable`: both bodies can move. `share` is the length of the contact's substeps over that of class
+    /// 0. Twin of the function of the same name in `shaders/resident/begin_contacts.wgsl`.
     #[inline(always)]
     pub(crate) fn yielding<L: Lane>(&self, share: L, both_movable: L::Mask, pressed: L) -> L {
         let [movable, fixed] = [self.movable_compliance, self.fixed_compliance].map(|c| L::constant(c.into()));
@@ -73,14 +75,15 @@ impl Preload {
     }
 }
 
-/// How much a contact is preloaded that was so by `before`, when what it bears compresses its springs by `sag`. Double of the function of
-/// the same name in `shaders/resident/begin_contacts.wgsl`.
+/// The new preload of a contact that had the preload `before`, when its load compresses its springs by `sag`. Twin of
+/// the function of the same name in `shaders/resident/begin_contacts.wgsl`.
 ///
-/// That much its surfaces are taken to be thicker, little by little, so that the overlap vanishes while the springs stay as soft as they
-/// are for everything that is fast: the method of multipliers, with a multiplier for each manifold. One for each point rocks towers.
+/// The contact treats its surfaces as thicker by the preload. The preload grows step by step until the overlap
+/// vanishes, while the springs stay soft against everything fast. This is the method of multipliers with one multiplier
+/// for each manifold; one for each point makes towers rock.
 #[inline(always)]
 pub(super) fn preloaded<L: Lane>(by: &Preload, before: L, sag: L) -> L {
-    // Where the load ends, the preload ends too.
+    // The preload ends with the load.
     smaller(before + L::constant(by.share.into()) * (sag - before), L::constant(LARGEST_PRELOAD) * sag)
 }
 
@@ -90,7 +93,7 @@ mod tests {
 
     const BY: Preload = Preload { movable_compliance: 0.5, fixed_compliance: 0.25, share: 0.5, warm_start: 1 };
 
-    /// The overlap of springs side by side.
+    /// The overlap of parallel springs.
     fn sag(share: f32, both_movable: bool, pressed: f32, mass: f32) -> f32 {
         BY.yielding(share, both_movable, pressed) / mass
     }

@@ -1,4 +1,4 @@
-//! Whether a problem from any source keeps what backends rely on.
+//! Checks that a problem from any source keeps the rules that backends rely on.
 
 use std::fmt::Display;
 
@@ -12,8 +12,8 @@ pub(super) fn refuse(what: impl Display) -> Result<()> {
 }
 
 impl StepProblem {
-    /// Refuses a problem with an index that names no row, with rows of unequal number, or with a color in which a body that can move
-    /// occurs twice. The check reads no other numbers: numbers that are not finite are data.
+    /// Refuses a problem with an index beyond the rows, with counts that do not match, or with a color that has a
+    /// movable body twice. The check reads no other numbers, so numbers that are not finite pass.
     ///
     /// # Errors
     /// One line that names the row and the field.
@@ -28,8 +28,8 @@ impl StepProblem {
         self.check_colors()
     }
 
-    /// The blocks tile the colors: first all contacts, then all joints, all bodies, all rows of inertia, all systems of joints, all rows of
-    /// turning inertia.
+    /// Checks that the blocks tile the colors: first all contacts, then all joints, all bodies, all rows of inertia,
+    /// all systems of joints, and all rows of turning inertia.
     fn check_blocks(&self) -> Result<()> {
         let (colors, order) = (&self.colors, self.order.len());
         let ends = colors.first().zip(colors.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
@@ -110,7 +110,7 @@ impl StepProblem {
         Ok(())
     }
 
-    /// The contacts that take part have points of their own, and each its patch after them if there are any.
+    /// Checks that each contact that takes part has points of its own, followed by its patch if there are patches.
     fn check_points(&self) -> Result<()> {
         let patch = usize::from(self.has_patches());
         let mut owner = vec![u32::MAX; self.points.len()];
@@ -128,7 +128,7 @@ impl StepProblem {
             };
             if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
                 return refuse(format_args!(
-                    "contacts[{row}].first_point = {first}: points of contacts[{other}] are there"
+                    "contacts[{row}].first_point = {first}: overlaps the points of contacts[{other}]"
                 ));
             }
             own.fill(row);
@@ -136,7 +136,7 @@ impl StepProblem {
         Ok(())
     }
 
-    /// The joints that take part have axes of their own.
+    /// Checks that each joint that takes part has axes of its own.
     fn check_axes(&self) -> Result<()> {
         let mut owner = vec![u32::MAX; self.axes.len()];
         for &row in self.rows_of(&self.joint_colors()) {
@@ -152,7 +152,9 @@ impl StepProblem {
                 ));
             };
             if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
-                return refuse(format_args!("joints[{row}].first_axis = {first}: axes of joints[{other}] are there"));
+                return refuse(format_args!(
+                    "joints[{row}].first_axis = {first}: overlaps the axes of joints[{other}]"
+                ));
             }
             own.fill(row);
         }
@@ -194,7 +196,7 @@ impl StepProblem {
         Ok(())
     }
 
-    /// No color has a body twice that can move, and no block a body of another one.
+    /// Checks that no color has a movable body twice, and that no block has a movable body of another block.
     fn check_colors(&self) -> Result<()> {
         let mut block_of = vec![0; self.bodies.len()];
         for (i, block) in self.blocks.iter().enumerate() {
@@ -216,11 +218,11 @@ impl StepProblem {
                         }
                         if block_of[body] != i {
                             return refuse(format_args!(
-                                "color {color}: body {body} is not of block {i}, and can move"
+                                "color {color}: body {body} can move, but is not of block {i}"
                             ));
                         }
                         if std::mem::replace(&mut seen[body], color) == color {
-                            return refuse(format_args!("color {color}: body {body} occurs twice, and can move"));
+                            return refuse(format_args!("color {color}: body {body} can move, but occurs twice"));
                         }
                     }
                 }

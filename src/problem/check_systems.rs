@@ -1,12 +1,13 @@
-//! Whether systems of joints keep what backends rely on.
+//! Checks that systems of joints keep the rules that backends rely on.
 
 use super::check::refuse;
 use super::{JointRow, JointSystems, NodeRow, StepProblem};
 use crate::error::Result;
 
 impl StepProblem {
-    /// The anchors, locks and limits of the joints of the direct colors of a block are the rows of its systems, each once; the blocks and products of a
-    /// node are those of its system, and products come before the block that they are subtracted from.
+    /// Checks two rules. The systems of a block hold the anchors, locks and limits of the joints of its direct colors,
+    /// each once. The blocks and products of a node belong to its system, and products come before the block that they
+    /// are subtracted from.
     pub(super) fn check_systems(&self) -> Result<()> {
         let JointSystems { begins, softness, nodes, blocks, terms } = &self.systems;
         let ends = begins.first().zip(begins.last()).map_or([0, 0], |(first, last)| [*first as usize, *last as usize]);
@@ -72,7 +73,8 @@ impl StepProblem {
         Ok(())
     }
 
-    /// The rows of a joint that systems solve: its anchors, as none, and its locks and limits by their numbers, with whether each is a limit.
+    /// The rows of a joint that systems solve: its anchors as `None`, and its locks and limits as the number of the
+    /// axis and whether it is a limit.
     fn rows_to_solve(&self, joint: u32) -> impl Iterator<Item = Solved> {
         let JointRow { first_axis, axis_count, is_loose, .. } = self.joints[joint as usize];
         let axes = &self.axes[first_axis as usize..(first_axis + axis_count) as usize];
@@ -82,10 +84,10 @@ impl StepProblem {
     }
 }
 
-/// A row of a joint that systems solve.
+/// A row that systems solve: the joint, and a row of [`StepProblem::rows_to_solve`].
 type Solved = (u32, Option<(usize, bool)>);
 
-/// The rows of a node, likewise.
+/// The rows of a node, in the same form.
 fn rows_of_node(node: &NodeRow) -> impl Iterator<Item = Solved> + use<> {
     let node = *node;
     let anchors = Some(None).filter(|_| node.is_of_anchors());

@@ -1,4 +1,4 @@
-//! The rows of contacts: which manifold has which, in which order they are swept, and how they follow from step to step.
+//! The rows of contacts: the slot of each manifold, the order of the sweeps, and the changes from step to step.
 
 mod saved;
 
@@ -21,37 +21,39 @@ use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
 use crate::stats::HardestContact;
 use crate::world::{Body, BodyKind, Joint, Material, World};
 
-/// The manifolds that have rows, and their colors. Impulses and preloads stand in the rows, and nowhere else.
+/// The manifolds that have rows, and their colors. Only the rows hold impulses and preloads.
 #[derive(Debug, Default)]
 pub struct ContactRows {
     slots: Slots,
     graph: ConstraintGraph,
     /// The coloring of this step's contacts.
     pub coloring: Coloring,
-    /// Whether every manifold has a row for friction of its own.
+    /// Whether every manifold has a row for its own friction.
     patches: bool,
-    /// What the manifold of each slot was computed from.
+    /// The data that the manifold of each slot was computed from.
     computed: Vec<ComputedRow>,
-    /// Where bodies are.
+    /// The poses of bodies.
     poses: Vec<PoseRow>,
-    /// Whether the manifold of each slot jams: a point has an [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1.
+    /// Whether the manifold of each slot jams, with
+    /// [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1 at some point.
     jams: Vec<bool>,
     /// Whether the points of each slot's contact are struck together in this step; empty if none are.
     struck: Vec<bool>,
-    /// Whether each body may be faster anywhere than half of the threshold of restitution, and whether a joint holds it.
+    /// Whether any part of each body may be faster than half the threshold of restitution, and whether a joint holds
+    /// it.
     fast: Vec<bool>,
     jointed: Vec<bool>,
-    /// The classes of bodies that the rows were written for.
+    /// The classes of bodies when the rows were written.
     classes: Vec<u8>,
-    /// What all materials have in common; none where one may have changed.
+    /// The common facts about all materials; `None` if a material may have changed.
     materials: Option<Materials>,
-    /// The bodies that lie still and touch nothing that they touched before.
+    /// The bodies that lie still and have only new contacts.
     new_bodies: Vec<bool>,
     /// The material that hooks gave to the contact of each slot; empty if they gave none.
     hooked: Vec<Option<Material>>,
     /// Whether impulses are summed over the substeps of a step.
     pub sums: bool,
-    /// How the rows follow from those of the step before.
+    /// Changes of the rows since the step before.
     pub carry: Carry,
 }
 
@@ -68,12 +70,12 @@ crate::saved::cloned!(ContactRows {
     carry,
 } scratch { graph, poses, struck, fast, jointed, new_bodies });
 
-/// What the materials of a world have in common.
+/// Common facts about the materials of a world.
 #[derive(Clone, Copy, Debug, Default)]
 struct Materials {
     /// Whether any surface bounces.
     bounce: bool,
-    /// Whether any has more friction than [`LEAST_JAMMING`].
+    /// Whether any surface has more friction than [`LEAST_JAMMING`].
     may_jam: bool,
 }
 
@@ -91,18 +93,17 @@ impl Materials {
         Self::among(world.bodies.iter().flat_map(Body::materials))
     }
 
-    /// The same with the materials that hooks gave.
+    /// The same facts with the materials of hooks.
     fn and(self, hooked: &[Option<Material>]) -> Self {
         let Self { bounce, may_jam } = Self::among(hooked.iter().flatten().copied());
         Self { bounce: self.bounce || bounce, may_jam: self.may_jam || may_jam }
     }
 }
 
-/// Slots that one task goes over.
 const SLOTS_A_TASK: usize = 4096;
 
 impl ContactRows {
-    /// Gives rows to manifolds that began since, and takes those of manifolds that ended.
+    /// Gives rows to new manifolds, and takes back those of manifolds that ended.
     pub fn follow(&mut self, world: &World, detector: &mut Detector) {
         self.slots.follow(world, detector);
     }
@@ -122,8 +123,8 @@ impl ContactRows {
         }
     }
 
-    /// Sets the material that hooks give to the contact in a row, or that it has its own. Returns whether that changes
-    /// its rows.
+    /// Sets the material that hooks give to the contact in a row; `None` stands for its own. Returns whether that
+    /// changes the row.
     pub fn set_hooked(&mut self, row: u32, material: Option<Material>) -> bool {
         let row = row as usize;
         if self.hooked.get(row).copied().flatten() == material {
@@ -136,7 +137,7 @@ impl ContactRows {
         true
     }
 
-    /// Gives all contacts their own materials. Returns whether that changes any rows.
+    /// Returns all contacts to their own materials. Returns whether that changes any rows.
     pub fn forget_hooked(&mut self) -> bool {
         self.begin_hooked();
         let rows = 0..self.hooked.len() as u32;
@@ -150,7 +151,7 @@ impl ContactRows {
         self.slots.all[row as usize].write < Write::Computed
     }
 
-    /// Takes over bodies that came, went, or changed kind, groups or shapes.
+    /// Follows bodies that were added, removed, or changed in kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         if self.materials.is_some() {
             self.materials = Some(Materials::of(world));
@@ -161,7 +162,7 @@ impl ContactRows {
         }
     }
 
-    /// The rows that a manifold has.
+    /// The rows that belong to a manifold.
     pub fn taken(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         (0..).zip(&self.slots.all).filter(|(_, slot)| !slot.is_free()).map(|(row, _)| row)
     }
@@ -182,7 +183,7 @@ impl ContactRows {
         self.slots.colliders[row]
     }
 
-    /// Gives every manifold that takes part a color; one that has a color keeps it.
+    /// Gives a color to every manifold that takes part. A manifold that has a color keeps it.
     pub fn color(&mut self, world: &World, max_colors: u32) {
         let members: Vec<u32> = self.slots.taking_part().collect();
         self.coloring = self.graph.color_members(world.bodies.len(), &mut self.slots.edges, &members, max_colors);
@@ -193,12 +194,12 @@ impl ContactRows {
         self.slots.edges[row as usize].color
     }
 
-    /// Whether so many rows are new that it pays to sort all. A device that has rows cannot follow that.
+    /// Whether so many rows are new that it pays to sort all. A device that keeps the rows cannot follow a sort.
     pub fn are_unsorted(&self) -> bool {
         self.slots.are_unsorted()
     }
 
-    /// Puts the rows of contacts into the order of the sweeps.
+    /// Sorts the rows of contacts into the order of the sweeps.
     pub fn sort(&mut self, detector: &mut Detector, problem: &mut StepProblem) {
         let from = self.slots.sort(&self.coloring.order, detector);
         self.coloring.order = (0..self.coloring.order.len() as u32).collect();
@@ -220,8 +221,8 @@ impl ContactRows {
         }
     }
 
-    /// Follows the loads that contacts bore in the step before; returns the contact that asks for most. `is_one_class`: all substeps have
-    /// the length of class 0.
+    /// Updates the needs of contacts from their loads in the step before, and returns the contact with the largest
+    /// need. `is_one_class`: all substeps have the length of class 0.
     pub fn follow_loads(
         &mut self,
         config: &SolverConfig,
@@ -235,7 +236,7 @@ impl ContactRows {
                 slot.need = match problem.sags.get(i).filter(|_| slot.write != Write::New) {
                     Some(sag) => {
                         let share = if is_one_class { 1.0 } else { problem.contacts[i].substep_share };
-                        // In class 0 the substeps are longer, and sags grow with the square.
+                        // Class 0 has longer substeps, and sags grow with the square of the length.
                         effort::lasting(sag / (share * share * config.promised_sag(slot.size)), slot.need)
                     }
                     None => 0.0,
@@ -246,7 +247,7 @@ impl ContactRows {
             }
             hardest
         };
-        // Of equal ones the first.
+        // The first of equal needs wins.
         let harder = |one: Option<(usize, f32)>, other: Option<(usize, f32)>| match (one, other) {
             (Some(one), Some(other)) if other.1 > one.1 => Some(other),
             (one, other) => one.or(other),
@@ -256,7 +257,8 @@ impl ContactRows {
         hardest.map(|(i, need)| HardestContact { bodies: [body(edges[i].a), body(edges[i].b)], need })
     }
 
-    /// The contacts that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it touches.
+    /// The contacts that take part, for the effort of their islands. A moving kinematic body counts as a member of the
+    /// island that it touches.
     pub fn interfaces<'a>(
         &'a self,
         world: &'a World,
@@ -294,7 +296,7 @@ impl ContactRows {
         self.slots.taking_part().any(jams)
     }
 
-    /// Whether the contact in a row jams.
+    /// A test of whether the contact in a row jams.
     pub fn jams(&self) -> impl Fn(u32) -> bool + '_ {
         let may_jam = self.materials.unwrap_or_default().and(&self.hooked).may_jam;
         move |row| may_jam && self.jams[row as usize]
@@ -310,13 +312,14 @@ impl ContactRows {
         self.any_struck() && self.struck[row as usize]
     }
 
-    /// Notes the contacts of several points whose surfaces meet, in their mean, at more than the threshold of restitution. A joint hands a blow
-    /// on, so that the masses of two bodies do not tell what they give; these contacts are swept as others.
+    /// Marks as struck the contacts of several points whose surfaces meet, on average, faster than the threshold of
+    /// restitution. A contact of a body with joints is never struck: a joint passes a blow on, so the masses of the two
+    /// bodies do not tell its effect. Such contacts are swept like others.
     fn note_struck(&mut self, world: &World, threshold: f32, problem: &StepProblem) {
         let Self { slots, struck, fast, jointed, .. } = self;
         let is_fast = |(row, body): (&BodyRow, &Body)| {
             let [v, w] = [row.v, row.w].map(Vec3::from);
-            // No point of a solid is much further out than three radii of gyration; a driven body may have no mass.
+            // No point of a solid is much farther out than three radii of gyration. A driven body may have no mass.
             let reach = || 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
             let is_above = |half_square: f32| 8.0 * half_square > threshold * threshold;
             is_above(v.length_squared())
@@ -356,7 +359,7 @@ impl ContactRows {
         }
     }
 
-    /// Notes the bodies that lie still and touch nothing that they touched before; whether there are any.
+    /// Marks the bodies that lie still and have only new contacts, and returns whether there are any.
     pub fn note_new_bodies(&mut self, world: &World) -> bool {
         self.new_bodies.clear();
         let slots = || self.slots.all.iter().zip(&self.slots.edges).filter(|(slot, _)| slot.takes_part);
@@ -379,12 +382,12 @@ impl ContactRows {
         self.new_bodies.contains(&true)
     }
 
-    /// The bodies that [`Self::note_new_bodies`] noted; empty if there is none.
+    /// The bodies that [`Self::note_new_bodies`] marked; empty if there are none.
     pub fn new_bodies(&self) -> &[bool] {
         &self.new_bodies
     }
 
-    /// Writes the rows of a step of `dt` seconds, after those of bodies.
+    /// Writes the rows of a step of `dt` seconds, after the rows of bodies.
     pub fn write(
         &mut self,
         world: &World,
@@ -444,7 +447,8 @@ impl ContactRows {
         self.note_struck(world, config.restitution_threshold, problem);
     }
 
-    /// Makes room for the rows of all slots. Where friction acts at other places than before, it begins without impulses.
+    /// Makes room for the rows of all slots. If friction moves between points and manifolds, friction begins without
+    /// impulses.
     fn lay_out(&mut self, patches: bool, problem: &mut StepProblem) {
         let (count, stride) = (self.slots.all.len(), points_a_slot(patches));
         if patches != self.patches {
@@ -465,7 +469,7 @@ impl ContactRows {
         problem.points.resize(count * stride, PointRow::default());
         problem.impulses.resize(count * stride, ImpulseRow::default());
         if self.sums && problem.totals.is_empty() {
-            // Contacts that rest have no other sums than what they bear.
+            // Contacts at rest are not summed. Their sums are their impulses.
             problem.totals.clone_from(&problem.impulses);
         }
         problem.totals.resize(if self.sums { count * stride } else { 0 }, ImpulseRow::default());
@@ -473,7 +477,7 @@ impl ContactRows {
         self.jams.resize(count, false);
     }
 
-    /// Notes which rows are written again, for a device that has the others.
+    /// Records which rows are written again, for a device that keeps the others.
     fn note_written(&mut self, detector: &Detector) {
         self.carry.written.clear();
         if !self.carry.on_device {
@@ -491,7 +495,7 @@ impl ContactRows {
     }
 }
 
-/// The rows of slots, `stride` each, that were at these places; those of slots without rows are left as they come.
+/// The rows of slots, `stride` each, in a new order: `from` has their old places. Slots without rows get default rows.
 fn moved<T: Copy + Default>(rows: &[T], from: &[u32], stride: usize) -> Vec<T> {
     let mut moved = vec![T::default(); from.len() * stride];
     for (to, &from) in moved.chunks_mut(stride).zip(from) {

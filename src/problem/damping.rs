@@ -1,29 +1,30 @@
 //! The rows of damped bodies.
 //!
-//! The velocity of a body with the damping d follows v' = a - d v. With a constant acceleration a and x = d t its solution is
+//! The velocity of a body with the damping d follows v' = a - d v. With a constant acceleration a and x = d t its
+//! solution is
 //!
 //! ```text
 //! v(t) = v(0) - (1 - exp(-x)) v(0) + a t (1 - exp(-x))/x
 //! ```
 //!
-//! which holds over any number of substeps: a step from 0 to t and one from t to 2 t are the step from 0 to 2 t. The substeps of an island
-//! therefore do not change how its bodies slow down, as they do with v/(1 + d t).
+//! It holds over any number of substeps: a step from 0 to t and one from t to 2 t give the step from 0 to 2 t. The
+//! number of substeps of an island therefore does not change how its bodies slow down. With v/(1 + d t) it would.
 
 use super::StepProblem;
 use super::rows::DampingRow;
 use crate::world::World;
 
-/// The effect of a time on a velocity that decays at some rate.
+/// The effect of damping on a velocity over some time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decay {
-    /// The share that is lost: 1 - exp(-x).
+    /// The share of the velocity that is lost: 1 - exp(-x).
     pub loss: f64,
-    /// The velocity that an acceleration gives, by the acceleration (s).
+    /// The velocity gained by an acceleration, over the acceleration (s).
     pub gain: f64,
 }
 
 impl Decay {
-    /// At a rate (1/s), 0 or more, in some time (s).
+    /// Decay at a rate of 0 or more (1/s) over some time (s).
     pub fn of(rate: f32, time: f64) -> Self {
         let x = f64::from(rate) * time;
         let loss = loss_in(x);
@@ -31,9 +32,9 @@ impl Decay {
     }
 }
 
-/// 1 - exp(-x) for x of at least 0, by sums and products only, so that every platform has the same bits.
+/// 1 - exp(-x) for x >= 0. Sums and products alone give the same bits on every platform.
 fn loss_in(x: f64) -> f64 {
-    // Nothing is left in double precision.
+    // exp(-x) is below the rounding of 1 in double precision.
     if x >= 64.0 {
         return 1.0;
     }
@@ -53,7 +54,7 @@ fn loss_in(x: f64) -> f64 {
     loss
 }
 
-/// Writes the rows of damping, for substeps that are laid out: none where no body that takes part is damped.
+/// Writes the rows of damping once the blocks are laid out. There are no rows if no damped body takes part.
 pub fn write_dampings(world: &World, asleep: &[bool], problem: &mut StepProblem) {
     let StepProblem { dampings, masses, torques, blocks, order, colors, .. } = problem;
     dampings.clear();
@@ -70,7 +71,7 @@ pub fn write_dampings(world: &World, asleep: &[bool], problem: &mut StepProblem)
             let body = &world.bodies[i];
             let of = |rate: f32, acceleration: [f32; 3]| {
                 let Decay { loss, gain } = Decay::of(rate, time);
-                // The kernel takes the loss of the velocity that the acceleration gave already.
+                // The kernel also applies the loss to the velocity that the acceleration gave in this substep.
                 let besides = gain - time * (1.0 - loss);
                 (acceleration.map(|a| (f64::from(a) * besides) as f32), loss as f32)
             };

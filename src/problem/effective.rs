@@ -1,5 +1,5 @@
-//! How hard a constraint is to move: entries of S = G M⁻¹ Gᵀ at one contact point, from rows. The arithmetic is that of
-//! `src/problem/arithmetic.rs`. Derivation: docs/derivation.md.
+//! Effective masses of constraints: entries of S = G M⁻¹ Gᵀ at one contact point, from rows.
+//! `src/problem/arithmetic.rs` has the arithmetic. Derivation: docs/derivation.md.
 
 use glam::{Mat3, Vec3};
 
@@ -13,20 +13,20 @@ pub use super::arithmetic::LEAST_JAMMING;
 /// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseMass {
-    /// One over the mass; 0 if nothing moves it.
+    /// Inverse mass; 0 if nothing moves the body.
     pub mass: f32,
-    /// Inverse of the inertia about the centre of mass.
+    /// Inverse of the inertia about the center of mass.
     pub inertia: Mat3,
 }
 
 impl InverseMass {
-    /// From a row.
+    /// The inverse mass and inertia of a row.
     pub fn of(row: &MassRow) -> Self {
         let ([xx, xy, xz], [yy, yz, zz]) = (row.inv_inertia_x, row.inv_inertia_yz);
         Self { mass: row.inv_mass, inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]) }
     }
 
-    /// As the kernels have it.
+    /// The same in the form of the kernels.
     fn lane(&self) -> Mass<f32> {
         let Mat3 { x_axis: x, y_axis: y, z_axis: z } = self.inertia;
         let inv_inertia = Sym3 { x: math::vec3(x.x, y.x, z.x), yz: math::vec3(y.y, z.y, z.z) };
@@ -37,9 +37,9 @@ impl InverseMass {
 /// The effective masses of the points of one manifold.
 #[derive(Clone, Copy, Debug)]
 pub struct EffectiveMass<'a> {
-    /// Of a and b.
+    /// The inverse masses of a and b.
     pub inverse: &'a [InverseMass; 2],
-    /// Normal and tangent of the manifold.
+    /// The row with the normal and tangent of the manifold.
     pub row: &'a ContactRow,
 }
 
@@ -62,13 +62,13 @@ impl EffectiveMass<'_> {
         inverse_or_zero(self.entry(r_a, r_b, d, d))
     }
 
-    /// One over the inverse inertia about the normal.
+    /// One over the sum of the inverse inertias about the normal.
     pub fn twist(&self) -> f32 {
         let n = math::Vec3::load(self.row.normal);
         twist_mass(n, &self.inverse[0].lane(), &self.inverse[1].lane())
     }
 
-    /// How far friction jams a point: `jamming` in `src/problem/arithmetic.rs`.
+    /// How strongly friction jams a point: `jamming` in `src/problem/arithmetic.rs`.
     pub fn jamming(&self, r_a: Vec3, r_b: Vec3) -> f32 {
         let n = Vec3::from_array(self.row.normal);
         let (t_1, t_2) = self.row.tangents();

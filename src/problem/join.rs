@@ -1,8 +1,8 @@
-//! Steps of several worlds as one, so that small worlds fill the lanes of a processor together.
+//! Joins the steps of several worlds into one, so that small worlds fill the lanes of a processor together.
 //!
-//! Rows stand one world after another, and a color has the rows of that color of all worlds. No row of one world names a body of another, colors
-//! keep their order, and steps are joined only where each world's plan has the same rules as the plan of all. So each world gets the bits that it
-//! gets alone.
+//! The rows of one world follow those of another, and each color holds the rows of this color of all worlds. Each world
+//! gets the same bits as alone: no row names a body of another world, colors keep their order, and a step joins others
+//! only if its plan has the same rules as the joint plan.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::config::{Method, SolverConfig};
 
-/// The facts of all blocks that the rules of a plan follow from, besides the settings.
+/// The facts about all blocks that decide the rules of a plan, apart from the settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Alike {
     friction: bool,
@@ -23,12 +23,12 @@ pub(crate) struct Alike {
     joint_totals: bool,
     axes: bool,
     swept_axes: bool,
-    /// Without the counts.
+    /// With all counts zero.
     params: Params,
 }
 
 impl Alike {
-    /// Of a step; none where its sweeps depend on all islands together.
+    /// The facts of a step; `None` if its sweeps depend on all islands together.
     pub fn of(config: &SolverConfig, problem: &StepProblem) -> Option<Self> {
         if config.tolerance > 0.0 || config.method != Method::Plain {
             return None;
@@ -55,7 +55,7 @@ impl Alike {
     }
 }
 
-/// The facts that the rules of one block follow from.
+/// The facts that decide the rules of one block.
 #[derive(Clone, Copy, PartialEq)]
 struct BlockKind {
     substeps: u32,
@@ -81,7 +81,7 @@ impl BlockKind {
     }
 }
 
-/// Where the rows of a world begin among those of all.
+/// Where the rows of a world begin among the rows of all worlds.
 #[derive(Clone, Copy, Default)]
 struct Begin {
     bodies: u32,
@@ -116,7 +116,7 @@ impl Begin {
     }
 }
 
-/// Writes some steps that are alike into one, with its memory.
+/// Writes several similar steps into one, and reuses its memory.
 pub(crate) fn join(problems: &[&mut StepProblem], all: &mut StepProblem) {
     clear(all);
     let mut begins = Vec::with_capacity(problems.len());
@@ -126,7 +126,7 @@ pub(crate) fn join(problems: &[&mut StepProblem], all: &mut StepProblem) {
         push_rows(problem, begin, all);
         begin = begin.after(problem);
     }
-    // Those of axes stand behind those of all joints.
+    // Impulses of axes come after those of all joints.
     for problem in problems {
         all.joint_impulses.extend_from_slice(&problem.joint_impulses[problem.joints.len()..]);
         all.joint_totals.extend(problem.joint_totals.iter().skip(problem.joints.len()));
@@ -134,7 +134,7 @@ pub(crate) fn join(problems: &[&mut StepProblem], all: &mut StepProblem) {
     lay_out(problems, &begins, all);
 }
 
-/// Hands each world what a backend gave.
+/// Hands the results of a backend back to each world.
 pub(crate) fn part(all: &StepProblem, problems: &mut [&mut StepProblem]) {
     let mut begin = Begin::default();
     let joints = problems.iter().map(|problem| problem.joints.len()).sum();
@@ -215,7 +215,7 @@ fn clear(all: &mut StepProblem) {
     terms.clear();
 }
 
-/// The rows of a world, with what they name among all rows.
+/// Adds the rows of a world, with indices into the rows of all worlds.
 fn push_rows(one: &StepProblem, begin: Begin, all: &mut StepProblem) {
     all.params = Params {
         body_count: all.params.body_count + one.params.body_count,
@@ -258,7 +258,7 @@ fn push_systems(one: &JointSystems, begin: Begin, all: &mut JointSystems) {
     if one.is_empty() {
         return;
     }
-    // The end of the systems before is where these begin.
+    // The end of the systems before is the start of these.
     all.begins.pop();
     all.begins.extend(one.begins.iter().map(|node| node + begin.nodes));
     all.softness.extend_from_slice(&one.softness);
@@ -277,10 +277,10 @@ fn push_systems(one: &JointSystems, begin: Begin, all: &mut JointSystems) {
     all.terms.extend(one.terms.iter().map(|term| term.map(|block| block + begin.blocks)));
 }
 
-/// A block of one world: the world, and the block.
+/// A block, with the index of its world.
 type Of<'a> = (usize, &'a Block);
 
-/// Blocks whose rules are the same become one.
+/// Joins blocks with the same rules into one.
 fn lay_out(problems: &[&mut StepProblem], begins: &[Begin], all: &mut StepProblem) {
     let mut kinds: Vec<(BlockKind, Vec<Of>)> = Vec::new();
     for (world, problem) in problems.iter().enumerate() {

@@ -1,12 +1,12 @@
-//! What each joint of a connected set of bodies holds up.
+//! The load of each joint in a connected set of bodies.
 
 use std::collections::BTreeMap;
 
 use glam::Vec4;
 
-/// What each joint bears: mass times its place (kg m), and mass (kg). Every body passes its own, and what hangs on it, to the joints that lead
-/// to bodies which are nearer to a support, in equal parts. `sides` are the bodies of each joint that can move; a joint with one side is a
-/// support. Where there is none, the heaviest body takes its place.
+/// The load of each joint: the sum of mass times position (kg m), and the mass (kg). Every body passes its own mass and
+/// the load that hangs on it to the joints that lead toward a support, in equal parts. `sides` are the movable bodies
+/// of each joint. A joint with one side is a support. If there is none, the heaviest body takes its place.
 pub fn borne(sides: &[[Option<u32>; 2]], own: impl Fn(u32) -> Vec4) -> Vec<Vec4> {
     let mut of_body: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (joint, own) in sides.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! How far sweeps would leave the joints of a connected set of bodies open: nets, which are not solved at once, take substeps by it.
+//! An estimate of the gaps that sweeps would leave in the joints of a connected set of bodies. It decides the substeps
+//! of nets, whose joints are not solved directly.
 
 use std::f32::consts::TAU;
 
@@ -8,8 +9,8 @@ use super::joint_loads::borne;
 use crate::config::SolverConfig;
 use crate::world::{Body, BodyKind, Bounds, Joint, Linear, World};
 
-/// The largest gap that sweeps leave at rest in any of some joints, as a share of its arms. `sides` are the bodies of a joint that can move;
-/// `substep` is the length of a substep (s).
+/// The largest gap at rest that sweeps leave in any joint of a set, as a share of the arms of the joint. `sides` are
+/// the movable bodies of a joint; `substep` is the length of a substep (s).
 pub fn gap_of_sweeps(
     joints: &[u32],
     world: &World,
@@ -30,8 +31,8 @@ pub fn gap_of_sweeps(
     gaps.fold(0.0, f32::max)
 }
 
-/// The gap that a force of 1 N opens a swept joint by, as a share of its arms (1/N); none if it has no arms, or holds no point. `omega` is the frequency
-/// of the springs of sweeps.
+/// The gap of a swept joint under a force of 1 N, as a share of its arms (1/N); `None` if the joint has no arms or
+/// restricts no shifts. `omega` is the angular frequency of the springs that sweeps act as.
 fn share_of_force(joint: &Joint, world: &World, omega: f32) -> Option<f32> {
     let bears = match &joint.linear {
         Linear::Axes(axes) => axes.iter().any(|axis| axis.bounds != Bounds::Free),
@@ -41,7 +42,7 @@ fn share_of_force(joint: &Joint, world: &World, omega: f32) -> Option<f32> {
     Some(softness / (omega * omega * arms(joint, world))).filter(|share| bears && share.is_finite())
 }
 
-/// The lengths of the arms of a joint (m).
+/// The total length of the arms of a joint (m).
 fn arms(joint: &Joint, world: &World) -> f32 {
     let ends = bodies(joint).zip(world.anchors(joint));
     ends.map(|(i, anchor)| anchor.distance(world.bodies[i].center_of_mass())).sum()
@@ -56,16 +57,17 @@ fn movable<'a>(joint: &Joint, world: &'a World) -> impl Iterator<Item = &'a Body
     bodies(joint).map(|i| &world.bodies[i]).filter(|body| body.kind == BodyKind::Dynamic)
 }
 
-/// The gap of a swept joint that the settings promise (m), and the force that opens it as far (N); none if no force does. `substep` is the length of
-/// a substep (s).
+/// The gap of a swept joint that the settings promise (m), and the force that opens it this far (N); `None` if no force
+/// does. `substep` is the length of a substep (s).
 pub fn promised_gap(joint: &Joint, world: &World, config: &SolverConfig, substep: f32) -> Option<[f32; 2]> {
     let omega = TAU * config.joint_frequency / substep;
     let share = share_of_force(joint, world, omega)?;
     Some([config.max_joint_gap_share * arms(joint, world), config.max_joint_gap_share / share])
 }
 
-/// The gap that sweeps leave in a joint, as a share of its arms, or the angle that they leave under the moment of the weight (rad). `weight` is mass
-/// times place (kg m) and mass (kg) of what hangs on it.
+/// The gap that sweeps leave in a joint, as a share of its arms, or the angle that they leave under the moment of the
+/// weight (rad), whichever number is larger. `weight` is the load of the joint: mass times position (kg m), and mass
+/// (kg).
 fn gap_of_joint(joint: &Joint, weight: Vec4, world: &World, omega: f32) -> f32 {
     let force = weight.w * world.gravity_of(world.bodies.worlds()[joint.indices().0] as usize).length();
     let gap = share_of_force(joint, world, omega).map(|share| force * share);
@@ -78,7 +80,7 @@ fn gap_of_joint(joint: &Joint, weight: Vec4, world: &World, omega: f32) -> f32 {
     gap.unwrap_or(0.0).max(angle.filter(|angle| angle.is_finite()).unwrap_or(0.0))
 }
 
-/// The inverse inertia of a body about an axis across a direction: the mean of two axes (1/(kg m²)).
+/// The inverse inertia of a body about an axis perpendicular to a direction (1/(kg m²)), as the mean of two such axes.
 fn turn_across(body: &Body, direction: Vec3) -> f32 {
     let i: Mat3 = body.world_inverse_inertia();
     let along = direction.normalize_or_zero();

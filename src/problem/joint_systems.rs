@@ -1,28 +1,28 @@
-//! Joints that are solved at once: the order in which they are eliminated, and the blocks and products of their factors.
+//! Joints that are solved directly: the order of their elimination, and the blocks and products of their factors.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-/// Connected sets of joints, each solved at once by S = L D Lᵀ, in blocks of 3 x 3.
+/// Connected sets of joints. Each is solved directly by S = L D Lᵀ, in blocks of 3 x 3.
 #[derive(Debug, Default, PartialEq)]
 pub struct JointSystems {
-    /// Where the nodes of each system begin, and where the last end.
+    /// The start of the nodes of each system, and the end of the last.
     pub begins: Vec<u32>,
-    /// Softness of the joints of each system, relative to the trace of their own blocks.
+    /// Softness of the joints of each system, relative to the trace of each diagonal block.
     pub softness: Vec<f32>,
-    /// The rows of each system, up to three of a joint in a node, in the order of their elimination.
+    /// The rows of each system in the order of their elimination. A node has up to three rows of a joint.
     pub nodes: Vec<NodeRow>,
-    /// The blocks of L, column by column: first the pivot, then those below it.
+    /// The blocks of L, column by column: first the pivot, then the blocks below it.
     pub blocks: Vec<BlockRow>,
-    /// The products that are subtracted from a block: of a block of L with the transpose of a block of L D.
+    /// The products that are subtracted from a block. Each multiplies a block of L by the transpose of a block of L D.
     pub terms: Vec<[u32; 2]>,
 }
 
 crate::saved::state!(JointSystems { begins, softness, nodes, blocks, terms });
 
-/// Up to three rows of a joint and their column of L, 16 B.
+/// Up to three rows of a joint, with their column of L, 16 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct NodeRow {
@@ -32,14 +32,14 @@ pub struct NodeRow {
     pub first_block: u32,
     /// One past the last block of its column.
     pub end_block: u32,
-    /// Its rows: [`NodeRow::ANCHORS`], or in byte i one more than the number of an axis among those of the joint, with `NodeRow::LIMIT`; 0 for
-    /// no row.
+    /// Its rows: [`NodeRow::ANCHORS`], or a byte for each row. The byte is 0 if the row is missing. Otherwise it is 1
+    /// plus the number of an axis of the joint, with the bit `NodeRow::LIMIT` for a limit.
     pub rows: u32,
 }
 
 crate::saved::fields!(NodeRow { joint, first_block, end_block, rows });
 
-/// A number of the impulses of joints and axes.
+/// The place of one impulse of a joint or of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImpulseNumber {
     /// The row of `joint_impulses`.
@@ -49,13 +49,13 @@ pub struct ImpulseNumber {
 }
 
 impl NodeRow {
-    /// The rows of a node that holds the anchors together.
+    /// The rows of a node that keeps anchors together.
     pub const ANCHORS: u32 = u32::MAX;
 
-    /// The bit of a row that is a limit: it holds while it bears an impulse, and is not there otherwise.
+    /// The bit of a row that is a limit. A limit takes part only while its impulse is not zero.
     const LIMIT: u32 = 0x80;
 
-    /// The rows of a node of up to three axes, each with whether it is a limit.
+    /// The rows of a node of up to three axes: the number of each, and whether it is a limit.
     pub fn rows_of(axes: &[(u32, bool)]) -> u32 {
         let row = |&(axis, is_limit): &(u32, bool)| axis + 1 + if is_limit { Self::LIMIT } else { 0 };
         axes.iter().zip(0..3).map(|(axis, i)| row(axis) << (8 * i)).sum()
@@ -76,12 +76,12 @@ impl NodeRow {
         self.rows >> (8 * i) & 0xff != 0
     }
 
-    /// Whether its rows are those of the anchors.
+    /// Whether the node keeps anchors together.
     pub fn is_of_anchors(&self) -> bool {
         self.rows == Self::ANCHORS
     }
 
-    /// Its rows that are axes, each with the number of the axis among those of the joint.
+    /// The axes of the node: the row, and the number of the axis among those of the joint.
     pub fn axes(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         let rows = if self.is_of_anchors() { 0 } else { self.rows };
         (0..3).filter_map(move |i| Some((i, (rows >> (8 * i) & (Self::LIMIT - 1)).checked_sub(1)? as usize)))
@@ -92,7 +92,7 @@ impl NodeRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BlockRow {
-    /// The node whose row it is in.
+    /// The node of its row of L.
     pub node: u32,
     /// Bit 2 i + j: side i of the joint of the column is the same body as side j of the joint of the row.
     pub shared: u32,
@@ -116,7 +116,8 @@ impl JointSystems {
         self.blocks_of(nodes.start).start..self.blocks_of(nodes.end - 1).end
     }
 
-    /// Whether two systems have nodes of the same kinds and factors of the same blocks and products, so that they can be solved side by side.
+    /// Whether two systems have nodes of the same kinds, and factors with the same blocks and products. Such systems
+    /// can be solved side by side.
     pub fn are_of_one_form(&self, [one, other]: [usize; 2]) -> bool {
         let [nodes, other_nodes] = [one, other].map(|system| self.nodes_of(system));
         let [blocks, other_blocks] = [one, other].map(|system| self.blocks_of_system(system));
@@ -154,7 +155,7 @@ impl JointSystems {
         self.begins.len().saturating_sub(1)
     }
 
-    /// Whether there is none.
+    /// Whether there are no systems.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -164,8 +165,9 @@ impl JointSystems {
         *self = Self::default();
     }
 
-    /// Adds the system of some nodes, each the rows of a joint ([`NodeRow::rows`]), if its factors have at most `most_terms` products. `sides`
-    /// are the bodies of a joint that can move. Nodes of a joint stand beside each other. False without any.
+    /// Adds the system of some nodes, each a joint with rows ([`NodeRow::rows`]), if its factors have at most
+    /// `most_terms` products and it has any nodes. Returns whether it did. `sides` are the movable bodies of a joint.
+    /// Nodes of one joint must be neighbors.
     pub fn add(&mut self, nodes: &[(u32, u32)], sides: impl Fn(u32) -> [Option<u32>; 2], most_terms: usize) -> bool {
         let sides = |node: u32| sides(nodes[node as usize].0);
         let Some(columns) = eliminated(nodes.len(), &sides, most_terms).filter(|columns| !columns.is_empty()) else {
@@ -177,7 +179,7 @@ impl JointSystems {
         let base = self.nodes.len() as u32;
         let mut place = vec![0; nodes.len()];
         columns.iter().zip(base..).for_each(|((local, _), at)| place[*local as usize] = at);
-        // The blocks, column by column, rows ascending.
+        // The blocks of L, column by column, with ascending rows.
         for (local, below) in &columns {
             let first_block = self.blocks.len() as u32;
             let node = place[*local as usize];
@@ -208,7 +210,7 @@ impl JointSystems {
         true
     }
 
-    /// The products of the blocks of the last system, whose nodes begin at `base`.
+    /// Adds the products of the blocks of the last system, whose nodes begin at `base`.
     fn add_terms(&mut self, base: usize) {
         let first_block = self.nodes[base].first_block as usize;
         let mut terms = vec![Vec::new(); self.blocks.len() - first_block];
@@ -232,25 +234,26 @@ impl JointSystems {
     }
 }
 
-/// Softness of joints in loops. Loops may hold each other more than once, as the joints of a sheet that lies in a plane do: S is singular
-/// then, and no impulse follows from it. 2^-14 / 3 gives way by 0.04 mm at 1/480 s where 300 times the mass of a ball hangs on it.
+/// Softness of joints in loops. Loops may be redundant, as in a flat sheet. S is then singular and determines no
+/// impulse. A joint with 2^-14 / 3 yields by 0.04 mm at 1/480 s under 300 times the mass of a ball.
 const LOOP_SOFTNESS: f32 = 6.103_515_6e-5 / 3.0;
 
-/// Softness of joints in trees with locks to turn about. Single precision loses the turn of a long lever of links in that of one link: its
-/// pivot is the difference of numbers 1e7 times as large. This is 2^-19 / 3, above what rounding leaves.
+/// Softness of joints in trees with locked angles, 2^-19 / 3, above the rounding errors. In single precision the turn
+/// of one link is lost in the turn of a long lever of links: the pivot of the link is a difference of numbers 1e7 times
+/// as large.
 const AXIS_SOFTNESS: f32 = 1.907_348_6e-6 / 3.0;
 
-/// Whether more joints than needed hold the bodies together, given the bodies of each that can move.
+/// Whether the bodies have more joints than they need. `joints` has the movable bodies of each joint.
 fn has_loops(joints: &[[Option<u32>; 2]]) -> bool {
     let mut bodies: Vec<u32> = joints.iter().flatten().flatten().copied().collect();
     bodies.sort_unstable();
     bodies.dedup();
-    // One joint of a tree may hold it to the world.
+    // One joint may connect a tree to the world.
     joints.len() > bodies.len()
         || joints.iter().filter(|sides| sides.iter().flatten().count() == 2).count() >= bodies.len()
 }
 
-/// The bits of `BlockRow::shared`.
+/// The bits of `BlockRow::shared`, for the sides of two joints.
 fn shared_sides(column: [Option<u32>; 2], row: [Option<u32>; 2]) -> u32 {
     let mut bits = 0;
     for (i, a) in column.iter().enumerate() {
@@ -263,11 +266,11 @@ fn shared_sides(column: [Option<u32>; 2], row: [Option<u32>; 2]) -> u32 {
     bits
 }
 
-/// Nodes in the order of their elimination, each with those that come after it and that its column of L has blocks for. None if there
-/// are more than `most_terms` products. `sides` are the bodies of a node that can move.
+/// The nodes in the order of their elimination, each with the later nodes that have a block in its column of L. `None`
+/// if there are more than `most_terms` products. `sides` are the movable bodies of a node.
 ///
-/// The node with the fewest neighbors comes next, and of several the one that has waited longest: the ends of a chain in turn, so that
-/// a processor works on two recurrences side by side.
+/// The node with the fewest neighbors comes next; of several, the one that has waited longest. In a chain this takes
+/// nodes from both ends in turn, so a processor works on two recurrences side by side.
 fn eliminated(
     count: usize,
     sides: &impl Fn(u32) -> [Option<u32>; 2],

@@ -1,4 +1,5 @@
-//! The rows of joints: one for each joint of the world, in its order, and those of their axes. An impulse stays in its row.
+//! The rows of joints and of their axes. Each joint of the world has one row, in the order of the world, and keeps its
+//! impulse there.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -28,20 +29,20 @@ pub struct JointRows {
     /// Whether the step sums the impulses of all joints over its substeps.
     pub sums: bool,
     is_colored: bool,
-    /// The length of the substeps that each impulse belongs to, over that of class 0; 0 without an impulse.
+    /// The length of the substeps of each impulse, over that of class 0; 0 without an impulse.
     shares: Vec<f32>,
-    /// The system of each joint that is solved directly, `SWEPT` of the others.
+    /// The system of each joint that is solved directly; `SWEPT` for the others.
     systems: Vec<u32>,
-    /// The length of a substep that the systems were chosen for; none if they are to be chosen.
+    /// The length of a substep that the systems were chosen for; `None` before the choice.
     chosen_for: Option<f32>,
-    /// The gravity that the bodies of joints felt then.
+    /// The gravity on the bodies of joints at that choice.
     gravity: Vec<Vec3>,
     swept_gap: f32,
     /// The needs of the joints that are left to sweeps.
     left: Vec<LeftToSweeps>,
-    /// What turns opens joints by, over the promised gap: this times ω² (s²).
+    /// The factor from ω² of turning arms to the gap that they open, relative to the promised gap (s²).
     gap_of_turns: f32,
-    /// Inertia that joints lend to bodies, in memory that every step uses again.
+    /// Inertia that joints lend to bodies, in memory that steps reuse.
     lent: Vec<LentInertia>,
 }
 
@@ -59,15 +60,15 @@ crate::saved::state!(JointRows {
     left,
 } scratch { graph, sums, gap_of_turns, lent });
 
-/// How much further a joint of a net that swings may open in the next step.
+/// The factor by which a joint of a swinging net may open further in the next step.
 const GROWTH: f32 = 2.5;
 
-/// The need of a joint that is left to sweeps; none of another one.
+/// The need of a joint that is left to sweeps; 0 for other joints.
 #[derive(Clone, Copy, Debug)]
 struct LeftToSweeps {
-    /// The gap that it would have with the substeps of the settings, over the promised one.
+    /// The gap with the substeps of the settings, over the promised gap.
     need: f32,
-    /// The promised gap (m), and the force that opens it as far with these substeps (N).
+    /// The promised gap (m), and the force that opens it this far with these substeps (N).
     gap: f32,
     force: f32,
 }
@@ -78,11 +79,11 @@ impl LeftToSweeps {
     const NONE: Self = Self { need: 0.0, gap: f32::INFINITY, force: f32::INFINITY };
 }
 
-/// Most products of blocks a node. A chain of balls has 1, a ring 3, a ladder of two joints a seam 6; a sheet of 16 x 16 balls 100, and more
-/// substeps are cheaper there.
+/// Most products of blocks for each node. A chain of balls has 1, a ring 3, and a ladder with two joints at each seam
+/// 6. A sheet of 16 x 16 balls has 100, where more substeps are cheaper.
 const MOST_TERMS_A_NODE: usize = 24;
 
-/// The system of a joint that is swept.
+/// Stands for the system of a joint that is swept.
 const SWEPT: u32 = u32::MAX;
 
 impl JointRows {
@@ -91,24 +92,24 @@ impl JointRows {
         self.joints == *world.joints && self.handles == world.joints.handles()
     }
 
-    /// The row of a joint in the last step.
+    /// The row that a joint had in the last step.
     pub fn row_of(&self, world: &World, joint: JointHandle) -> Option<usize> {
-        // Rows are in the order of the joints before the caller or the step removed some.
+        // Rows keep the order of the joints from before the caller or the step removed some.
         let now = world.joints.index(joint)?;
         let is_here = |&row: &usize| self.handles.get(row) == Some(&joint);
         Some(now).filter(is_here).or_else(|| self.handles.iter().position(|handle| *handle == joint))
     }
 
-    /// The length of a substep of a joint in the last step, over that of class 0.
+    /// The length of a joint's substeps in the last step, over that of class 0.
     pub fn share(&self, row: usize) -> f32 {
         self.shares[row]
     }
 
-    /// Refuses rows that name bodies, joints or systems that are not there.
+    /// Refuses rows with indices beyond the bodies, joints or systems.
     pub(crate) fn check(&self, bodies: usize, problem: &StepProblem) -> Result<()> {
         let count = self.joints.len();
         let lengths = [self.handles.len(), self.edges.len(), self.shares.len()];
-        // The impulses of axes stand behind those of joints.
+        // The impulses of axes come after those of joints.
         let impulses = problem.joint_impulses.len();
         ensure(lengths == [count; 3] && impulses >= count, || {
             format!("{lengths:?}, {impulses} rows of {count} joints")
@@ -119,28 +120,31 @@ impl JointRows {
             a < bodies && b.is_none_or(|b| b < bodies)
         };
         let are_bodies = self.edges.iter().all(|edge| is_body(&edge.a) && is_body(&edge.b));
-        ensure(are_bodies && self.joints.iter().all(has_bodies), || "a joint is of a body beyond the last".into())?;
+        ensure(are_bodies && self.joints.iter().all(has_bodies), || "a joint names a body beyond the last".into())?;
         let Coloring { order, offsets, .. } = &self.coloring;
         let are_joints = order.iter().all(|&joint| (joint as usize) < count);
         let are_colors = offsets.is_sorted() && offsets.last().is_none_or(|&end| end as usize <= order.len());
         let are_systems = self.systems.iter().all(|&s| s == SWEPT || (s as usize) < problem.systems.len());
         let are_chosen = self.chosen_for.is_none() || [self.systems.len(), self.left.len()] == [count; 2];
-        ensure(are_joints && are_colors && are_systems && are_chosen, || "colors or systems of no joints".into())
+        ensure(are_joints && are_colors && are_systems && are_chosen, || {
+            "the colors or systems do not match the joints".into()
+        })
     }
 
-    /// Lets all joints choose their colors anew.
+    /// Forgets the colors of all joints, so that they are colored anew.
     pub fn forget_colors(&mut self) {
         self.edges.iter_mut().for_each(|edge| edge.color = None);
         self.is_colored = false;
     }
 
-    /// Lets the joints that are solved at once be chosen anew.
+    /// Forgets which joints are solved directly, so that they are chosen anew.
     pub fn forget_systems(&mut self) {
         self.chosen_for = None;
     }
 
-    /// Chooses the joints that are solved at once, unless they are chosen: one that is swept pulls its gap shut softly, and would gain energy if it
-    /// were solved at once from a later step on. `substep` is the length of a substep (s).
+    /// Chooses the joints that are solved directly, unless the choice is made already. The choice lasts, because a
+    /// swept joint leaves a gap that it closes softly. A later direct solution would gain energy from this gap.
+    /// `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
         self.gap_of_turns = 0.5 * substep * substep / config.max_joint_gap_share;
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
@@ -178,8 +182,9 @@ impl JointRows {
         }
     }
 
-    /// Takes over what the joints bore in the last substep that are left to sweeps, and how far they are open: a net that swings opens further than
-    /// its load tells. `substep` is the length of a substep of class 0 (s).
+    /// Updates the needs of the joints that are left to sweeps, from their impulses in the last substep and their
+    /// present gaps. The gaps count because a swinging net opens further than its load tells. `substep` is the length
+    /// of a substep of class 0 (s).
     pub fn follow_loads(&mut self, world: &World, substep: f32, problem: &StepProblem) {
         let rows = self.left.iter_mut().zip(&self.joints).zip(&self.shares).zip(&problem.joint_impulses);
         for (((left, joint), share), impulse) in
@@ -193,8 +198,8 @@ impl JointRows {
         }
     }
 
-    /// Solves the anchors and locks of some joints at once, which sweeps would leave open by `gap`, where that costs little enough; else they
-    /// need more substeps.
+    /// Adds a system for the anchors and locks of some joints, which sweeps would leave open by `gap`, if it is cheap
+    /// enough. If not, records that the joints need more substeps.
     fn decide(
         &mut self,
         joints: &[u32],
@@ -221,20 +226,21 @@ impl JointRows {
         }
     }
 
-    /// The bodies of a joint that can move.
+    /// The movable bodies of a joint.
     fn sides(&self, joint: u32) -> [Option<u32>; 2] {
         let Edge { a, b, .. } = self.edges[joint as usize];
         [a, b].map(|body| Some(body).filter(|&body| body != IMMOVABLE))
     }
 
-    /// The largest gap that sweeps would leave in any joint, as a share of its arms; 0 where all are swept by the settings.
+    /// The largest gap that sweeps would leave in any joint, as a share of its arms; 0 if the settings choose sweeps.
     pub fn swept_gap(&self) -> f32 {
         self.swept_gap
     }
 
-    /// Takes over the joints of the world; returns those that began, ended or changed.
+    /// Follows the joints of the world, and returns those that were added, removed or changed.
     ///
-    /// A joint keeps impulse and color wherever it stands in the list, and if its anchors move, but not if it ties other bodies.
+    /// A joint keeps its impulse and color at any place in the list, even if its anchors move. It loses them if it
+    /// connects other bodies.
     pub fn follow(&mut self, world: &World, problem: &mut StepProblem) -> Vec<Joint> {
         let (before, now) = (std::mem::take(&mut self.joints), &world.joints);
         let place_of: HashMap<JointHandle, usize> = self.handles.drain(..).zip(0..).collect();
@@ -246,7 +252,7 @@ impl JointRows {
         let from: Vec<Option<usize>> = now.iter().zip(now.handles()).map(from).collect();
         let edge = |(joint, from): (&Joint, &Option<usize>)| {
             let (a, b) = joint.indices();
-            // A joint that holds nothing ties nothing that could move.
+            // A joint that holds nothing connects no movable bodies.
             let is_end = |b: usize| world.bodies[b].kind == BodyKind::Dynamic && !joint.holds_nothing();
             let end = |b: usize| if is_end(b) { b as u32 } else { IMMOVABLE };
             let color = from.and_then(|i| self.edges[i].color);
@@ -257,12 +263,12 @@ impl JointRows {
         self.chosen_for = None;
         self.edges = edges;
         let old = std::mem::take(&mut problem.joint_impulses);
-        // A joint that is off bears nothing.
+        // A disabled joint has no impulse.
         let impulse = |(from, joint): (&Option<usize>, &Joint)| {
             from.filter(|_| joint.enabled).and_then(|i| old.get(i).copied()).unwrap_or_default()
         };
         problem.joint_impulses = from.iter().zip(now.iter()).map(impulse).collect();
-        // Impulses of axes follow if the joint has the same axes as before.
+        // Impulses of axes are kept if the joint has the same axes as before.
         let firsts: Vec<usize> = first_axes(&before).collect();
         for (joint, from) in now.iter().zip(&from) {
             let same = from.filter(|&i| joint.enabled && axes::kinds(&before[i]).eq(axes::kinds(joint)));
@@ -279,7 +285,7 @@ impl JointRows {
         all
     }
 
-    /// Gives every joint a color, unless all have theirs; joints and contacts share none.
+    /// Gives every joint a color, unless all have one. Joints and contacts share no colors.
     pub fn color(&mut self, world: &World, max_colors: u32) {
         if !self.is_colored {
             self.coloring = self.graph.color(world.bodies.len(), &mut self.edges, max_colors);
@@ -293,10 +299,10 @@ impl JointRows {
             || (0..self.joints.len()).any(|joint| self.need_of_turns(world, joint) > 1.0)
     }
 
-    /// The gap that turning arms would open a joint by in class 0, over the promised one. Arms turn, and centers of mass go straight: in a substep h
-    /// that opens a joint that is solved at once by (h ω)²/2 of an arm.
+    /// The gap that turning arms would open in a joint in class 0, over the promised gap. Arms turn, but centers of
+    /// mass move straight on. In a substep h this opens a direct joint by (h ω)²/2 of an arm.
     fn need_of_turns(&self, world: &World, joint: usize) -> f32 {
-        // Springs of swept joints would change their stiffness as bodies turn.
+        // The springs of swept joints would change their stiffness as bodies turn.
         if self.systems.get(joint).is_none_or(|&system| system == SWEPT) {
             return 0.0;
         }
@@ -311,7 +317,8 @@ impl JointRows {
         if arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 }
     }
 
-    /// The joints that take part, for the effort of their islands. A kinematic body that moves belongs to the island that it holds.
+    /// The joints that take part, for the effort of their islands. A moving kinematic body counts as a member of the
+    /// island that it holds.
     pub fn interfaces(&self, world: &World, asleep: &[bool]) -> impl Iterator<Item = Interface> + Clone {
         let awake = self.joints.iter().enumerate().filter(move |(i, _)| takes_part(world, asleep, *i as u32));
         let end = |body: usize| match world.bodies[body].kind {
@@ -328,12 +335,13 @@ impl JointRows {
         })
     }
 
-    /// Whether a joint is solved at once with others, and not swept.
+    /// Whether a joint is solved directly, and not swept.
     pub fn is_direct(&self, joint: u32) -> bool {
         self.systems[joint as usize] != SWEPT
     }
 
-    /// Writes the rows of all joints, after those of bodies and contacts. `substep` is the length of a substep of class 0 (s).
+    /// Writes the rows of all joints, after those of bodies and contacts. `substep` is the length of a substep of class
+    /// 0 (s).
     pub fn write(
         &mut self,
         world: &World,
@@ -398,13 +406,13 @@ impl JointRows {
             joint.can_break() || joint.is_driven() || is_driven(a) || b.is_some_and(is_driven)
         };
         if self.sums || world.joints.iter().any(is_measured) {
-            // A joint that takes no part bears nothing that could break it.
+            // A joint that does not take part has no load that could break it.
             problem.joint_totals.resize(problem.joint_impulses.len(), JointImpulseRow::default());
         }
         let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
         let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
         lend_inertia(direct.map(|joint| (joint, substep * self.shares[joint])), &mut self.lent, problem);
-        // The axes that a body does not turn about are those of the world.
+        // Locked axes are axes of the world, so the inverse inertia of a body with locked axes does not turn with it.
         problem.turning.retain(|row| !world.bodies[row.body as usize].has_locked_rotation());
         // The world, as a body that nothing moves.
         if world.joints.iter().any(|j| j.body_b.is_none()) {
@@ -421,7 +429,7 @@ impl JointRows {
     }
 }
 
-/// Where the axes of each joint begin.
+/// The index of the first axis of each joint.
 fn first_axes(joints: &[Joint]) -> impl Iterator<Item = usize> {
     joints.iter().scan(0, |next, joint| {
         let first = *next;
@@ -430,8 +438,8 @@ fn first_axes(joints: &[Joint]) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Whether a joint of the world is swept. A joint holds bodies of one island, which are asleep together; one of two bodies that nothing moves
-/// has no block to solve, and one that holds nothing has no row.
+/// Whether the step solves a joint of the world. A joint connects bodies of one island, which are asleep together. A
+/// joint of two bodies that nothing moves has no block, and a joint that holds nothing has no row.
 pub(super) fn takes_part(world: &World, asleep: &[bool], joint: u32) -> bool {
     let joint = &world.joints[joint as usize];
     let (a, b) = joint.indices();

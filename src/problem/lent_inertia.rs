@@ -1,4 +1,5 @@
-//! Inertia that joints lend to the bodies that they pull on, so that explicit steps stay stable. Derivation: docs/derivation.md.
+//! Inertia that joints lend to the bodies that they pull on. It keeps explicit steps stable. Derivation:
+//! docs/derivation.md.
 
 use glam::{DMat3, Vec3};
 
@@ -9,13 +10,14 @@ use super::rows::TurningRow;
 /// Inertia that one joint lends to a body.
 pub(super) type LentInertia = (u32, DMat3);
 
-/// (h w)² of a body that swings at the frequency w under the pull of its joints, above which it is lent inertia. Explicit steps are
-/// stable below 4. Chains of 10 to 300 links with 1000 times at the end over 50 s, which go slack and snap: with 3 none gains energy and
-/// gaps stay below 25 mm; with 2 and less energy grows up to 0.1 of the swing, as the lent inertia comes and goes; with 4 gaps reach 2.5 m.
+/// (h w)² above which a body is lent inertia, where w is the frequency at which it swings under the pull of its joints.
+/// Explicit steps are stable below 4. The value was measured on chains of 10 to 300 links with 1000 times the mass at
+/// the end, which go slack and snap, over 50 s. With 3 no chain gains energy and gaps stay below 25 mm. With 2 and
+/// less, energy grows by up to 0.1 of the swing, as the lent inertia comes and goes. With 4 gaps reach 2.5 m.
 const SWING_LIMIT: f64 = 3.0;
 
-/// h² times the stiffness against turning that a joint at the arm `r` gives a body while it pulls with `impulse` in a substep of `h`
-/// seconds: |r| |F| across the arm.
+/// h² times the rotational stiffness of a body under a joint at the arm `r` that pulls with `impulse` in a substep of
+/// `h` seconds: |r| |F| about axes perpendicular to the arm.
 fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     let (r, impulse) = (r.as_dvec3(), impulse.as_dvec3());
     let tension = r.dot(impulse);
@@ -26,8 +28,8 @@ fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     (DMat3::IDENTITY - along) * (tension * f64::from(h))
 }
 
-/// Gives the bodies of joints that are solved at once the inertia that their joints lend them, and lets it turn with them. `joints` has the
-/// joints that take part, each with the length of its substeps (s); `lent` is memory that every step uses again.
+/// Lends inertia to the bodies of joints that are solved directly, and adds the rows that turn it with the bodies.
+/// `joints` has the joints that take part, each with the length of its substeps (s). `lent` is memory that steps reuse.
 pub(super) fn lend_inertia(
     joints: impl Iterator<Item = (usize, f32)>,
     lent: &mut Vec<LentInertia>,

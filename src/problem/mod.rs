@@ -1,4 +1,4 @@
-//! One step as a value: plain rows, whose names are the names of the WGSL bindings.
+//! One step as plain rows, with the names of the WGSL bindings.
 
 pub(crate) mod arithmetic;
 mod axes;
@@ -51,8 +51,8 @@ use glam::Vec3;
 use crate::error::Result;
 use crate::saved::{Archive, Saved};
 
-/// Everything that a backend needs for one step, and everything that it gives back (`bodies`, `impulses`,
-/// `totals`, `joint_impulses`, `joint_totals`, `convergence`, `momentum`).
+/// The input of a backend for one step, and its output: `bodies`, `impulses`, `totals`, `joint_impulses`,
+/// `joint_totals`, `convergence` and `momentum`.
 ///
 /// ```
 /// use drystone::{Reference, Simulation, SolverConfig, StepProblem};
@@ -70,46 +70,47 @@ use crate::saved::{Archive, Saved};
 /// ```
 #[derive(Debug, Default, PartialEq)]
 pub struct StepProblem {
-    /// The same for all.
+    /// Numbers that are the same for all rows.
     pub params: Params,
-    /// State, one row a body of the world.
+    /// State of the bodies, one row for each body of the world.
     pub bodies: Vec<BodyRow>,
-    /// Masses, one row a body.
+    /// Masses, one row for each body.
     pub masses: Vec<MassRow>,
-    /// Angular accelerations by torques, one row a body; empty where no body has a torque.
+    /// Angular accelerations by torques, one row for each body; empty if no body has a torque.
     pub torques: Vec<TorqueRow>,
     /// Effects of damping, one row for each body; empty if no body is damped.
     pub dampings: Vec<DampingRow>,
-    /// Principal inertia of the bodies whose moments differ; empty where the scene has none.
+    /// Principal inertia of the bodies whose moments differ; empty if there are none.
     pub inertias: Vec<InertiaRow>,
-    /// Manifolds, in slots that they keep as long as they last. Only those in `order` take part.
+    /// Manifolds. Each keeps its slot as long as it lasts. Only the contacts in `order` take part.
     pub contacts: Vec<ContactRow>,
     /// Points of the manifolds.
     pub points: Vec<PointRow>,
     /// Impulses of the points.
     pub impulses: Vec<ImpulseRow>,
-    /// Their sums over the substeps of the step, without peaks; empty where nobody asks for them.
+    /// Sums of the impulses over the substeps of the step, without peaks; empty unless they are asked for.
     pub totals: Vec<ImpulseRow>,
-    /// How deep the bodies of each manifold sag at rest under what it bore in the step before, face to face (m).
+    /// Sag of each manifold at rest under its load in the step before, from the masses of its bodies without their
+    /// inertia (m).
     pub sags: Vec<f32>,
-    /// Joints. Only those in `order` take part.
+    /// Joints. Only the joints in `order` take part.
     pub joints: Vec<JointRow>,
-    /// Axes of joints; empty where all are ball joints.
+    /// Axes of joints; empty if all joints are ball joints.
     pub axes: Vec<AxisRow>,
     /// Impulses of the joints, then of the axes.
     pub joint_impulses: Vec<JointImpulseRow>,
-    /// Their sums over the substeps of the step; empty where nobody asks for them.
+    /// Sums of the impulses of joints over the substeps of the step; empty unless they are asked for.
     pub joint_totals: Vec<JointImpulseRow>,
-    /// The rows that passes go over, color by color: the contacts and the joints that take part, the bodies, the rows of unequal
-    /// moments of inertia, the systems of joints that take part, and the rows of turning inertia.
+    /// The rows that passes go over, color by color: the contacts and joints that take part, the bodies, the rows of
+    /// unequal moments of inertia, the systems of joints that take part, and the rows of turning inertia.
     pub order: Vec<u32>,
-    /// Where each color begins in `order`, and where the last ends.
+    /// The start of each color in `order`, and the end of the last.
     pub colors: Vec<u32>,
-    /// The blocks, one after another in each of the six kinds of colors.
+    /// The blocks. Their colors follow each other within each of the six kinds of rows.
     pub blocks: Vec<Block>,
-    /// Joints that are solved at once.
+    /// Joints that are solved directly, in systems.
     pub systems: JointSystems,
-    /// Bodies of joints that are solved at once.
+    /// Bodies of joints that are solved directly.
     pub turning: Vec<TurningRow>,
     /// Whether the sweeps still move anything.
     pub convergence: ConvergenceRow,
@@ -142,7 +143,8 @@ crate::saved::cloned!(StepProblem {
     momentum,
 });
 
-/// What the next step goes on from, but for the rows of contacts ([`ContactRows::walk`]); the step writes all else anew.
+/// The state that the next step continues from, without the rows of contacts ([`ContactRows::walk`]). The step writes
+/// all other fields anew.
 impl Saved for StepProblem {
     fn blank() -> Self {
         Self::default()
@@ -195,12 +197,12 @@ impl StepProblem {
         self.blocks.first().zip(self.blocks.last()).map_or(0..0, |(first, last)| first.systems..last.systems + 1)
     }
 
-    /// Whether any joints are solved at once.
+    /// Whether any joints are solved directly.
     pub fn has_systems(&self) -> bool {
         !self.rows_of(&self.system_colors()).is_empty()
     }
 
-    /// The contacts, or joints, of some neighboring colors, by their rows.
+    /// The rows of some neighboring colors.
     pub fn rows_of(&self, colors: &Range<u32>) -> &[u32] {
         if colors.is_empty() {
             return &[];
@@ -213,8 +215,8 @@ impl StepProblem {
         self.rows_of(&self.contact_colors()).iter().map(|&row| &self.contacts[row as usize])
     }
 
-    /// Makes one block of all rows that are there, contacts and joints each in one color. Its substep is that of the block before, if
-    /// there was one.
+    /// Makes one block of all rows, with all contacts in one color and all joints in another. The block keeps the
+    /// substep of the first block before, if there was one.
     pub fn sweep_in_order_of_rows(&mut self) {
         let substep = self.blocks.first().map(|block| block.substep).unwrap_or_default();
         self.order = (0..self.contacts.len() as u32).chain(0..self.joints.len() as u32).collect();
@@ -223,11 +225,11 @@ impl StepProblem {
         self.in_one_block(1, substep);
     }
 
-    /// Makes one block of all bodies, and of the contacts and joints whose colors stand in `order`: first those of contacts,
-    /// `contact_colors` of them, then those of joints.
+    /// Makes one block of all bodies, and of the contacts and joints in `order`. The first `contact_colors` colors are
+    /// those of contacts, the others those of joints.
     pub fn in_one_block(&mut self, contact_colors: u32, substep: Substep) {
         let joints = [contact_colors, (self.colors.len() as u32).saturating_sub(1).max(contact_colors)];
-        // Where systems stand, they solve all joints.
+        // Systems, if there are any, solve all joints.
         let direct = if self.systems.is_empty() { joints[1] } else { joints[0] };
         self.colors.resize(self.colors.len().max(1), 0);
         for count in [self.bodies.len(), self.inertias.len(), self.systems.len(), self.turning.len()] {
@@ -261,12 +263,12 @@ impl StepProblem {
         self.axes.iter().any(|axis| !axis.is_lock())
     }
 
-    /// The impulse of a joint on its body b, of the rows `joint_impulses` or `joint_totals`.
+    /// The impulse of a joint on its body b, from `joint_impulses` or `joint_totals`.
     pub(crate) fn joint_impulse(&self, impulses: &[JointImpulseRow], joint: usize) -> Vec3 {
         Vec3::from(impulses[joint].linear) + self.axis_impulse(impulses, joint, true)
     }
 
-    /// That of those axes of a joint that shift body b, or turn it.
+    /// The part of this impulse by the axes that body b shifts along (`is_linear`), or by those that it turns about.
     pub(crate) fn axis_impulse(&self, impulses: &[JointImpulseRow], joint: usize, is_linear: bool) -> Vec3 {
         let JointRow { first_axis, axis_count, .. } = self.joints[joint];
         let own = first_axis as usize..(first_axis + axis_count) as usize;
@@ -276,7 +278,7 @@ impl StepProblem {
         wanted.map(|(axis, impulse)| Vec3::from(axis.direction) * -impulse.linear[0]).sum()
     }
 
-    /// Where the three rows of a node have their impulses; none of a row that is not there.
+    /// Where the impulses of the three rows of a node are; `None` for a row that the node lacks.
     pub(crate) fn numbers_of(&self, node: &NodeRow) -> [Option<ImpulseNumber>; 3] {
         let joint = node.joint as usize;
         if node.is_of_anchors() {
@@ -288,12 +290,13 @@ impl StepProblem {
         numbers
     }
 
-    /// Number of impulses, those of patches, joints and their axes included.
+    /// Number of impulses, including those of patches, joints and axes.
     pub fn impulse_count(&self) -> usize {
         self.impulses.len() + self.joint_impulses.len()
     }
 
-    /// Whether each of some bodies has the same inverse inertia about all axes; it is zero where nothing turns a body.
+    /// Whether each of some bodies has the same inverse inertia about all axes. The inverse inertia of a body that
+    /// nothing turns is zero.
     pub fn is_isotropic(&self, bodies: &[u32]) -> bool {
         bodies.iter().map(|&body| &self.masses[body as usize]).all(|mass| {
             let ([xx, xy, xz], [yy, yz, zz]) = (mass.inv_inertia_x, mass.inv_inertia_yz);

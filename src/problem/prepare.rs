@@ -1,7 +1,8 @@
 //! Effective masses, separations and preloads of slots, sixteen slots at a time.
 //!
-//! Most of the time goes into memory: 160 B of rows and 192 B of points a manifold, and two bodies anywhere. What a reused manifold needs of the
-//! past stands in the order of the slots, and not where its pair is: from there a read took 36 ns of the 91 ns a manifold.
+//! Memory takes most of the time: each manifold has 160 B of rows and 192 B of points, and two bodies at any place. The
+//! former state of a reused manifold is stored in the order of the slots. Reading it from its pair took 36 ns of the 91
+//! ns for each manifold.
 
 #![allow(unsafe_code)]
 
@@ -17,7 +18,7 @@ use crate::collide::{MAX_POINTS, Manifold, Placed};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work};
 use crate::math::{Quat, reciprocal, vec3};
 
-/// Where a body is, 32 B.
+/// Pose of a body, 32 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub(super) struct PoseRow {
@@ -28,7 +29,7 @@ pub(super) struct PoseRow {
     pub rotation: [f32; 4],
 }
 
-/// What a manifold was computed from, 64 B.
+/// The data that a manifold was computed from, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub(super) struct ComputedRow {
@@ -73,7 +74,7 @@ pub(super) struct Prepare<'a> {
     pub jams: Shared<'a, bool>,
 }
 
-/// A step of the preparation over some slots, ascending.
+/// One kind of preparation over some slots, in ascending order.
 pub(super) struct Over<'a> {
     pub rows: &'a Prepare<'a>,
     pub slots: &'a [u32],
@@ -84,11 +85,11 @@ pub(super) struct Over<'a> {
 pub(super) enum What {
     /// The effective masses of points.
     Masses { tangents: bool, jams: bool },
-    /// The separations of points where the bodies are now, and then preloads and sags by the impulses of the step before.
+    /// The present separations of points, and then preloads and sags from the impulses of the step before.
     Begin { separations: bool, loads: bool },
 }
 
-/// Sixteen slots; the last one stands in the lanes that are left.
+/// Sixteen slots. The last slot also fills the lanes that are left.
 struct Group {
     slots: [u32; WIDTH],
     len: usize,
@@ -97,7 +98,7 @@ struct Group {
     most: u32,
 }
 
-/// Numbers of 8 bytes in a row.
+/// Size of a row in units of 8 bytes.
 const fn units<T>() -> u32 {
     (size_of::<T>() / 8) as u32
 }
@@ -121,7 +122,7 @@ impl Over<'_> {
         Group { slots, len: own.len(), bodies, counts, most }
     }
 
-    /// Normal, friction, tangent, restitution of contacts; or the second half of their rows.
+    /// Normal, friction, tangent and restitution of contacts (half 0), or the other half of their rows.
     #[inline(always)]
     fn contacts<L: Lanes>(&self, group: &Group, half: u32) -> [L; 8] {
         let places = places(&group.slots, units::<ContactRow>(), 4 * half);
@@ -134,7 +135,7 @@ impl Over<'_> {
     fn points<L: Lanes>(&self, group: &Group, k: usize) -> [L; 8] {
         let stride = self.rows.stride as u32 * units::<PointRow>();
         let places = places(&group.slots, stride, k as u32 * units::<PointRow>());
-        // SAFETY: a slot has a stride of points, k of them and more, and only this task has them.
+        // SAFETY: a slot has `stride` points, more than `k`, and only this task has them.
         unsafe { L::gathered(self.rows.points.as_ptr().cast(), &places) }
     }
 
@@ -143,11 +144,11 @@ impl Over<'_> {
     fn impulses<L: Lanes>(&self, group: &Group, k: u32) -> [L; 8] {
         let stride = self.rows.stride as u32 * units::<ImpulseRow>();
         let places = places(&group.slots, stride, k * units::<ImpulseRow>());
-        // SAFETY: as of points.
+        // SAFETY: as for points.
         unsafe { L::gathered(self.rows.impulses.as_ptr().cast(), &places) }
     }
 
-    /// What manifolds were computed from, the first or the second half.
+    /// The data that manifolds were computed from, the first or the second half.
     #[inline(always)]
     fn computed<L: Lanes>(&self, group: &Group, half: u32) -> [L; 8] {
         let places = places(&group.slots, units::<ComputedRow>(), 4 * half);
@@ -155,7 +156,7 @@ impl Over<'_> {
         unsafe { L::gathered(self.rows.computed.as_ptr().cast(), &places) }
     }
 
-    /// Inverse inertia and mass of the bodies a, or b.
+    /// Inverse inertia and inverse mass of some bodies.
     #[inline(always)]
     fn masses<L: Lanes>(&self, bodies: &[u32; WIDTH]) -> Mass<L> {
         let places = places(bodies, units::<MassRow>(), 0);
@@ -169,7 +170,7 @@ impl Over<'_> {
     #[inline(always)]
     fn pose<L: Lanes>(&self, bodies: &[u32; WIDTH]) -> Pose<L> {
         let places = places(bodies, units::<PoseRow>(), 0);
-        // SAFETY: as of masses.
+        // SAFETY: as for masses.
         let [x, y, z, _, qx, qy, qz, qw] = unsafe { L::gathered(self.rows.poses.as_ptr().cast::<Row8>(), &places) };
         Pose { center: vec3(x, y, z), rotation: Quat { axis: vec3(qx, qy, qz), w: qw } }
     }
@@ -274,7 +275,7 @@ impl Work for Over<'_> {
     }
 }
 
-/// Where rows of a table are, in units of 8 bytes.
+/// The places of the rows of a table, in units of 8 bytes.
 #[inline(always)]
 fn places(rows: &[u32; WIDTH], stride: u32, offset: u32) -> [u32; WIDTH] {
     let mut places = *rows;

@@ -1,4 +1,4 @@
-//! Impulses and preloads follow a change of the length of a substep or of the stiffness of contacts.
+//! Scales impulses and preloads when the length of a substep or the stiffness of contacts changes.
 
 use super::StepProblem;
 use super::carry::LARGEST_PRELOAD;
@@ -6,43 +6,45 @@ use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use crate::config::SolverConfig;
 use crate::world::{BodyKind, World};
 
-/// The quantities that the impulses and preloads of a step are proportional to.
+/// The numbers that scale the impulses and preloads of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepScale {
-    /// Length of a substep (s). A contact that bears a force passes on the force times this in a substep.
+    /// Length of a substep (s). The impulse of a contact in a substep is its force times this length.
     substep: f32,
-    /// Overlap at rest per impulse, times the effective mass, of contacts between bodies that can move (s).
+    /// Ratio of the overlap at rest to the impulse, times the effective mass, for contacts between movable bodies (s).
     movable_compliance: f32,
-    /// The same of contacts with bodies that cannot (s).
+    /// The same for contacts with bodies that cannot move (s).
     fixed_compliance: f32,
 }
 
 crate::saved::fields!(StepScale { substep, movable_compliance, fixed_compliance });
 
 impl StepScale {
-    /// The length of steps of so many substeps (s).
+    /// The length of a step with this number of substeps (s).
     pub fn step(&self, substeps: u32) -> f32 {
         self.substep * substeps as f32
     }
 
-    /// How deep the springs of a contact are compressed at rest by the normal impulses `pressed`, times the mass that they feel (kg m).
+    /// Compression of the springs of a contact at rest under the normal impulses `pressed`, times their effective mass
+    /// (kg m).
     pub(super) fn yielding(&self, both_movable: bool, pressed: f32) -> f32 {
         pressed * if both_movable { self.movable_compliance } else { self.fixed_compliance }
     }
 
-    /// That of steps of `dt` seconds.
+    /// The scale of steps of `dt` seconds.
     pub fn new(config: &SolverConfig, dt: f32) -> Self {
         let Substep { length, movable, fixed, .. } = Substep::new(config, dt / config.substeps as f32);
         Self { substep: length, movable_compliance: movable.compliance(), fixed_compliance: fixed.compliance() }
     }
 }
 
-/// Brings a contact from substeps of one share of those of class 0 to another, so that it bears the same force. Its springs get stiffer by
-/// the square of the ratio, and are then compressed by as much less; the preload takes up what the bodies already sank in. Without that a
-/// tower of 1 and 1000 times in turn jumped up with 0.9 m/s when its substeps were doubled. `sag` is how much the load of the contact
-/// compresses the springs that it had.
+/// Changes the length of a contact's substeps, as a share of those of class 0, without a change of its force. The
+/// springs become stiffer by the square of the ratio, so the same load compresses them less, and the preload makes up
+/// the difference. Without that, a tower of alternating masses of 1 and 1000 jumped up at 0.9 m/s when its substeps
+/// were doubled. `sag` is the compression of the former springs by the load of the contact.
 ///
-/// An overlap beyond that is no load but a push. A preload that took it up held a body 0.25 m deep in a wall, which was on its way out of it.
+/// A deeper overlap is a push and not a load. A preload that took it up would hold a deeply overlapping body in place
+/// and keep it from being pushed out.
 pub(super) fn change_share(
     contact: &mut ContactRow,
     share: f32,
@@ -65,14 +67,15 @@ fn scale_impulse(impulse: &mut ImpulseRow, factor: f32) {
     impulse.tangent_2 *= factor;
 }
 
-/// The quotient, or 1 where nothing is to be divided by.
+/// The quotient, or 1 without a divisor.
 fn ratio(now: f32, before: f32) -> f32 {
     if before > 0.0 { now / before } else { 1.0 }
 }
 
 impl StepScale {
-    /// Rescales the impulses and preloads of a step of the scale `before`, so that all contacts and joints bear the same forces in a
-    /// step of this one. A pile that came to rest with 32 substeps rattled at 0.8 m/s without this when it went on with 8.
+    /// Rescales the impulses and preloads of a step with the scale `before`, so that all contacts and joints have the
+    /// same forces in a step with this scale. Without it, a pile that came to rest with 32 substeps rattled at 0.8 m/s
+    /// when it continued with 8.
     pub fn rescale(&self, before: &Self, world: &World, problem: &mut StepProblem) {
         let forces = ratio(self.substep, before.substep);
         let movable = forces * ratio(self.movable_compliance, before.movable_compliance);
@@ -92,7 +95,8 @@ impl StepScale {
 mod tests {
     use super::*;
 
-    /// Half as long substeps are four times as stiff: the compression of 0.5 m shrinks to an eighth, and impulses to a half.
+    /// Substeps of half the length are four times as stiff: the compression of 0.5 m shrinks to a quarter, and impulses
+    /// shrink to a half.
     #[test]
     fn a_contact_bears_the_same_force_with_substeps_of_another_length() {
         let mut contact =
@@ -107,7 +111,8 @@ mod tests {
         assert_eq!(impulses, [ImpulseRow { normal: 8.0, tangent_1: 4.0, tangent_2: -2.0, peak: 1.0 }]);
     }
 
-    /// What is 0.25 m deep and bears nothing is pushed out as before. Of what bears a load, twice the overlap at rest counts at most.
+    /// A contact without a load that is 0.25 m deep is pushed out as before. Under a load, the overlap counts up to
+    /// twice the overlap at rest.
     #[test]
     fn an_overlap_that_bears_no_load_stays_an_overlap() {
         let points = [PointRow { separation: -0.25, ..PointRow::default() }];

@@ -1,7 +1,7 @@
-//! The rows of a [`StepProblem`](super::StepProblem): plain memory, the same in Rust and WGSL.
+//! The rows of a [`StepProblem`](super::StepProblem), with the same layout in Rust and WGSL.
 //!
-//! Every row is a multiple of 16 bytes and has a twin in `shaders/lib/types.wgsl`; `tests/cpu/shaders.rs` compares the
-//! offset of every field by reflection.
+//! The size of every row is a multiple of 16 bytes. Each row has a twin in `shaders/lib/types.wgsl`, and
+//! `tests/cpu/shaders.rs` compares the offset of every field by reflection.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -10,11 +10,11 @@ use super::arithmetic::tangent_of;
 use crate::collide::MAX_POINTS;
 use crate::math;
 
-/// State of one body that a step changes, 64 B.
+/// State of one body, which a step changes, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct BodyRow {
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub v: [f32; 3],
     #[doc(hidden)]
     pub pad_v: f32,
@@ -22,7 +22,7 @@ pub struct BodyRow {
     pub w: [f32; 3],
     #[doc(hidden)]
     pub pad_w: f32,
-    /// Movement of the centre of mass since the step began (m).
+    /// Movement of the center of mass since the step began (m).
     pub dp: [f32; 3],
     #[doc(hidden)]
     pub pad_dp: f32,
@@ -36,12 +36,12 @@ impl BodyRow {
         Self { v: [0.0; 3], pad_v: 0.0, w: [0.0; 3], pad_w: 0.0, dp: [0.0; 3], pad_dp: 0.0, dq: [0.0, 0.0, 0.0, 1.0] };
 }
 
-/// Velocities of one body as they would be without the impulses of this substep, 32 B. A backend keeps them from pass to
-/// pass; no step asks for those of the step before, so they are not part of a problem.
+/// Velocities of one body without the impulses of this substep, 32 B. A backend keeps them between passes. No step
+/// needs those of the step before, so they are not part of a problem.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FreeRow {
-    /// Velocity of the centre of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub v: [f32; 3],
     #[doc(hidden)]
     pub pad_v: f32,
@@ -51,11 +51,11 @@ pub struct FreeRow {
     pub pad_w: f32,
 }
 
-/// How hard one body is to move, 48 B. All zero for a body that cannot be pushed.
+/// Inverse mass and inertia of one body, 48 B. All zero for a body that cannot be pushed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MassRow {
-    /// Inverse inertia about the centre of mass, world axes (1/(kg m²)); xx xy xz.
+    /// Inverse inertia about the center of mass, world axes (1/(kg m²)); xx xy xz.
     pub inv_inertia_x: [f32; 3],
     /// Inverse mass (1/kg).
     pub inv_mass: f32,
@@ -69,32 +69,32 @@ pub struct MassRow {
     pub pad_end: f32,
 }
 
-/// What the torque on one body does, 16 B.
+/// Effect of the torque on one body, 16 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct TorqueRow {
-    /// Inverse inertia when the step begins times torque, world axes (rad/s²).
+    /// Inverse inertia when the step begins, times torque, world axes (rad/s²).
     pub angular_acceleration: [f32; 3],
     #[doc(hidden)]
     pub pad: f32,
 }
 
 impl TorqueRow {
-    /// The row of a body without torque: negative zero changes no bit of what it is added to, not even of a negative zero.
+    /// The row of a body without torque. Adding negative zero changes no bit of any number, not even of negative zero.
     pub const NONE: Self = Self { angular_acceleration: [-0.0; 3], pad: 0.0 };
 }
 
-/// Effect of damping on one body in a substep: a velocity v changes by the gain minus the loss times v, in addition to the
-/// plain acceleration, 32 B.
+/// Effect of damping on one body in a substep, 32 B. Besides the plain acceleration, a velocity v changes by the gain
+/// minus the loss times v.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DampingRow {
-    /// Velocity that gravity and force add to the plain acceleration, because it does not decay for the whole substep
-    /// (m/s).
+    /// Velocity that gravity and force add besides the plain acceleration, because it does not decay for the whole
+    /// substep (m/s).
     pub linear_gain: [f32; 3],
-    /// The share of the velocity that is lost, 0 to 1; 0 of a body without linear damping.
+    /// The share of the velocity that is lost, 0 to 1; 0 without linear damping.
     pub linear_loss: f32,
-    /// Angular velocity that the torque adds likewise (rad/s).
+    /// Angular velocity that the torque adds in the same way (rad/s).
     pub angular_gain: [f32; 3],
     /// The share of the angular velocity that is lost, 0 to 1.
     pub angular_loss: f32,
@@ -104,12 +104,12 @@ pub struct DampingRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct InertiaRow {
-    /// Principal moments of inertia, by the power of two (kg m²) in the largest: only their ratios matter, and no product
-    /// with spins leaves single precision.
+    /// Principal moments of inertia, divided by the power of two (kg m²) in the largest. Only their ratios matter. The
+    /// scale keeps products with spins within single precision.
     pub principal: [f32; 3],
-    /// Whose they are.
+    /// The body.
     pub body: u32,
-    /// One over those.
+    /// One over the principal moments.
     pub inv_principal: [f32; 3],
     #[doc(hidden)]
     pub pad: f32,
@@ -117,7 +117,7 @@ pub struct InertiaRow {
     pub frame: [f32; 4],
 }
 
-/// One manifold: the contact of two bodies over up to four points with one normal, 64 B.
+/// One manifold: the contact of two bodies at up to four points with one normal, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ContactRow {
@@ -133,19 +133,22 @@ pub struct ContactRow {
     pub body_a: u32,
     /// The body that the normal points to.
     pub body_b: u32,
-    /// Where its points begin in `points` and `impulses`.
+    /// Index of its first point in `points` and `impulses`.
     pub first_point: u32,
-    /// How many points it has, 1 to 4. With friction per manifold one more row follows them, the patch: its arms are those
-    /// of their middle, its normal mass is that of the twist about the normal, its normal impulse the twist's.
+    /// Number of its points, 1 to 4. With friction per manifold one more row follows them: the patch. Its arms are the
+    /// means of the points' arms, its normal mass is that of the twist about the normal, and its normal impulse is that
+    /// of the twist.
     pub point_count: u32,
-    /// Radius of curvature of a's surface where it touches, 0 if flat or sharp (m): a round body turns under its contact.
+    /// Radius of curvature of a's surface at the contact, 0 if flat or sharp (m). A round body turns beneath its
+    /// contact.
     pub radius_a: f32,
     /// Radius of curvature of b's surface (m).
     pub radius_b: f32,
-    /// How far the springs of a soft contact are compressed while the surfaces just touch (m). The contact
-    /// acts on the separation less the preload.
+    /// Compression of the springs of a soft contact while the surfaces just touch (m). The contact acts on the
+    /// separation less the preload.
     pub preload: f32,
-    /// Length of its substeps over that of class 0: a power of two (docs/derivation.md). Impulses are in proportion to it.
+    /// Length of its substeps over that of class 0, a power of two (docs/derivation.md). Impulses are proportional to
+    /// it.
     pub substep_share: f32,
 }
 
@@ -165,18 +168,18 @@ crate::saved::fields!(ContactRow {
 });
 
 impl ContactRow {
-    /// A row of nothing but a normal and the tangents that belong to it.
+    /// A row with only a normal and its tangents.
     pub fn framed(normal: Vec3) -> Self {
         let tangent = tangent_of(math::Vec3::<f32>::load(normal.to_array()));
         Self { normal: normal.to_array(), tangent: tangent.store(), ..Self::default() }
     }
 
-    /// Whether this is one of its bodies.
+    /// Whether a body is one of its two.
     pub(crate) fn holds(&self, body: usize) -> bool {
         self.body_a as usize == body || self.body_b as usize == body
     }
 
-    /// The two tangents; together with the normal a right-handed frame.
+    /// The two tangents, which form a right-handed frame with the normal.
     pub fn tangents(&self) -> (Vec3, Vec3) {
         let tangent_1 = Vec3::from_array(self.tangent);
         (tangent_1, Vec3::from_array(self.normal).cross(tangent_1))
@@ -187,20 +190,21 @@ impl ContactRow {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PointRow {
-    /// From the centre of mass of a to the point when the step begins, world axes (m).
+    /// From the center of mass of a to the point when the step begins, world axes (m).
     pub r_a: [f32; 3],
     /// Separation when the step begins, negative when overlapping (m).
     pub separation: f32,
-    /// From the centre of mass of b to the point (m).
+    /// From the center of mass of b to the point (m).
     pub r_b: [f32; 3],
     /// One over the normal entry of G M⁻¹ Gᵀ (kg).
     pub normal_mass: f32,
     /// One over the largest eigenvalue of the tangential 2x2 block of G M⁻¹ Gᵀ; with one slip direction, one over the
-    /// entry of that direction (kg).
+    /// entry of this direction (kg).
     pub tangent_mass: f32,
-    /// Normal velocity with which the surfaces meet, negative when approaching (m/s).
+    /// Normal velocity when the surfaces meet, negative when approaching (m/s).
     pub approach_velocity: f32,
-    /// Component of the slip direction along the first tangent; with friction per manifold, distance from the patch (m).
+    /// Component of the slip direction along the first tangent; with friction per manifold, the distance from the patch
+    /// (m).
     pub slip_1: f32,
     /// Component of the slip direction along the second tangent.
     pub slip_2: f32,
@@ -208,7 +212,7 @@ pub struct PointRow {
 
 crate::saved::fields!(PointRow { r_a, separation, r_b, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 });
 
-/// The inverse inertia of a body of joints that are solved at once, when the step begins; it turns with the body, 32 B.
+/// The inverse inertia of a body of direct joints when the step begins, 32 B. It turns with the body.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TurningRow {
@@ -222,67 +226,67 @@ pub struct TurningRow {
     pub pad: f32,
 }
 
-/// One joint: the anchors of two bodies coincide, or axes guide them, 64 B.
+/// One joint, which makes the anchors of two bodies coincide or guides the bodies by axes, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct JointRow {
-    /// From the centre of mass of a to its anchor when the step begins, world axes (m).
+    /// From the center of mass of a to its anchor when the step begins, world axes (m).
     pub r_a: [f32; 3],
     /// One body.
     pub body_a: u32,
-    /// From the centre of mass of b to its anchor (m).
+    /// From the center of mass of b to its anchor (m).
     pub r_b: [f32; 3],
     /// The other body.
     pub body_b: u32,
     /// Anchor of b less anchor of a when the step begins (m).
     pub gap: [f32; 3],
-    /// 1 if the anchors need not coincide. The arm of b then ends at the anchor of a.
+    /// 1 if the anchors need not coincide. In this case the arm of b ends at the anchor of a.
     pub is_loose: f32,
-    /// Where its axes begin in `axes`.
+    /// Index of its first axis in `axes`.
     pub first_axis: u32,
-    /// How many axes it has, up to [`MOST_AXES`].
+    /// Number of its axes, up to [`MOST_AXES`].
     pub axis_count: u32,
     #[doc(hidden)]
     pub pad: [u32; 2],
 }
 
-/// Most rows of axes of one joint: each of its six axes may have bounds and a drive.
+/// Most rows of axes of one joint: six axes, each with bounds and a drive.
 pub const MOST_AXES: usize = 12;
 
-/// [`AxisRow::left`] of rows that are no limits; limits this far away, and infinite ones, are never reached (m, rad).
+/// [`AxisRow::left`] of rows that are no limits. Limits this far away, and infinite limits, are never reached (m, rad).
 pub const NO_LIMIT: f32 = -1e18;
 
-/// One axis of a joint along which or about which body a is held, limited or driven against body b, 48 B. Its impulse, on a, is the first
-/// number of a row of `joint_impulses`; those rows follow the rows of all joints.
+/// One axis along which or about which a joint holds, limits or drives body a against body b, 48 B. Its impulse on a is
+/// the first number of a row of `joint_impulses`. The rows of axes follow those of all joints.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct AxisRow {
-    /// Direction when the step begins, world axes; it turns with b. Of unit length, or a little longer for the angle about a first axis that
-    /// is turned aside.
+    /// Direction when the step begins, world axes. It turns with b. Its length is 1, or a little more for the angle
+    /// about a first axis that is turned aside.
     pub direction: [f32; 3],
-    /// 1 to shift along it, 0 to turn about it.
+    /// 1 to shift along the axis, 0 to turn about it.
     pub is_linear: f32,
-    /// Where a is when the step begins: above its lower limit, or beyond the place where it is to be (m, rad).
+    /// Position of a when the step begins, above its lower limit or beyond its target (m, rad).
     pub gap: f32,
-    /// How far a is below its upper limit when the step begins (m, rad); [`NO_LIMIT`] of a row that is no limit.
+    /// Distance of a from its upper limit when the step begins (m, rad); [`NO_LIMIT`] of a row that is no limit.
     pub left: f32,
-    /// The speed of its motor (m/s, rad/s).
+    /// Speed of the motor (m/s, rad/s).
     pub speed: f32,
-    /// The largest impulse of a substep (N s, N m s).
+    /// Largest impulse in a substep (N s, N m s).
     pub max_impulse: f32,
-    /// Of a spring, and of bounds of an axis with a drive, the speed that it gives in a substep by gap (1/s).
+    /// Ratio of the speed in a substep to the gap (1/s), for a spring and for bounds of an axis with a drive.
     pub rate: f32,
-    /// Of a drive, the share of the speed that it takes away in a substep: 1 of a motor, and of bounds of an axis with a drive; of other bounds
-    /// 0.
+    /// Share of the speed that a drive takes away in a substep, 1 for a motor. Bounds have 1 on an axis with a drive,
+    /// and 0 on other axes.
     pub mass_scale: f32,
-    /// Of a spring, the share of its impulse that is given back; else 0.
+    /// Share of the impulse that a spring gives back; 0 for other rows.
     pub impulse_scale: f32,
-    /// The distance of the anchors when the step begins, if the axis joins them (m); else 0.
+    /// Distance between the anchors when the step begins, if the axis joins them (m); otherwise 0.
     pub length: f32,
 }
 
 impl AxisRow {
-    /// Whether it is a limit: of two bounds that differ.
+    /// Whether the row is a limit, with two different bounds.
     pub fn is_limit(&self) -> bool {
         self.left > 0.5 * NO_LIMIT
     }
@@ -305,7 +309,7 @@ pub struct JointImpulseRow {
 
 crate::saved::fields!(JointImpulseRow { linear, pad });
 
-/// Whether sweeps still move anything, 16 B. Written by the sweeps of a step that has a tolerance.
+/// Whether sweeps still move anything, 16 B. The sweeps of a step with a tolerance write it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct ConvergenceRow {
@@ -313,27 +317,27 @@ pub struct ConvergenceRow {
     pub moving: u32,
     /// 1 if the remaining sweeps of this substep are skipped.
     pub done: u32,
-    /// Sweeps that were not skipped, over the whole step.
+    /// Sweeps that were not skipped in the whole step.
     pub sweeps: u32,
-    /// Sweeps that the plan holds, over the whole step.
+    /// Sweeps of the plan in the whole step.
     pub planned: u32,
 }
 
-/// How far accelerated sweeps extrapolate, 16 B. Written between them.
+/// How far accelerated sweeps extrapolate, 16 B. It is written between sweeps.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MomentumRow {
-    /// 1 without momentum, and more with every sweep that does not end it.
+    /// 1 without momentum. It grows with every sweep that does not end momentum.
     pub t: f32,
-    /// How far the next sweep is extrapolated, as a share of the last step; 0 after a restart.
+    /// Extrapolation of the next sweep, as a share of the last step; 0 after a restart.
     pub factor: f32,
-    /// Norm of the least change that a sweep made of all impulses since momentum last began, squared (N² s²).
+    /// Squared norm of the smallest change that a sweep made to all impulses since momentum last began (N² s²).
     pub square: f32,
-    /// How often momentum ended, over the whole step.
+    /// Number of times that momentum ended in the whole step.
     pub restarts: u32,
 }
 
-/// The impulses of one point, accumulated over the substeps' sweeps, 16 B (N s).
+/// The impulses of one point, accumulated over the sweeps of the substeps, 16 B (N s).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ImpulseRow {
@@ -343,7 +347,7 @@ pub struct ImpulseRow {
     pub tangent_1: f32,
     /// Along the second tangent, on b.
     pub tangent_2: f32,
-    /// Largest normal impulse so far in this step.
+    /// Largest normal impulse in this step so far.
     pub peak: f32,
 }
 
@@ -353,13 +357,13 @@ crate::saved::fields!(ImpulseRow { normal, tangent_1, tangent_2, peak });
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Softness {
-    /// Velocity wanted per overlap (1/s).
+    /// Ratio of the wanted velocity to the overlap (1/s).
     pub bias_rate: f32,
     /// Share of the effective mass that acts.
     pub mass_scale: f32,
-    /// Share of the accumulated impulse that is given back.
+    /// Share of the accumulated impulse that the contact gives back.
     pub impulse_scale: f32,
-    /// Fastest that overlap is pushed out (m/s).
+    /// Largest speed at which overlap is pushed out (m/s).
     pub push_limit: f32,
 }
 
@@ -369,23 +373,24 @@ impl Softness {
         Self { bias_rate, mass_scale: 1.0, impulse_scale: 0.0, push_limit }
     }
 
-    /// Overlap at rest per impulse of a substep, times the effective mass (s); 0 of a rigid constraint.
+    /// Ratio of the overlap at rest to the impulse of a substep, times the effective mass (s); 0 for a rigid
+    /// constraint.
     pub fn compliance(&self) -> f32 {
         if self.impulse_scale > 0.0 { self.impulse_scale / (self.mass_scale * self.bias_rate) } else { 0.0 }
     }
 }
 
-/// The numbers that are the same for every body and contact of a step, 48 B.
+/// Parameters for every body and contact of a step, 48 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Params {
-    /// Approach slower than this does not bounce (m/s).
+    /// A slower approach does not bounce (m/s).
     pub restitution_threshold: f32,
-    /// Overlap that is left alone (m).
+    /// Overlap that sweeps leave (m).
     pub slop: f32,
-    /// Factor of every correction.
+    /// Factor on every correction.
     pub relaxation: f32,
-    /// Corrections that change a relative velocity by less count as none (m/s).
+    /// Corrections that change a relative velocity by less count as zero (m/s).
     pub tolerance: f32,
     /// Number of bodies.
     pub body_count: u32,
@@ -397,7 +402,7 @@ pub struct Params {
     pub patches: u32,
     /// Number of axes of joints.
     pub axis_count: u32,
-    /// 0, which the compilers of shaders do not know: exact mode in WGSL.
+    /// Always 0. Shader compilers cannot know this, and the exact mode in WGSL relies on it.
     pub zero: u32,
     #[doc(hidden)]
     pub pad: [u32; 2],
@@ -407,24 +412,24 @@ pub struct Params {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Substep {
-    /// Its length (s).
+    /// Length (s).
     pub length: f32,
     /// One over the length (1/s).
     pub inverse_length: f32,
-    /// Contacts of two bodies that can move.
+    /// Softness of contacts between movable bodies.
     pub movable: Softness,
-    /// Contacts with a body that cannot.
+    /// Softness of contacts with a body that cannot move.
     pub fixed: Softness,
-    /// Joints.
+    /// Softness of joints.
     pub joint: Softness,
 }
 
-/// Rows in `points` and `impulses` that a slot of a simulation has.
+/// Number of rows in `points` and `impulses` for each slot of a simulation.
 pub(crate) fn points_a_slot(patches: bool) -> usize {
     MAX_POINTS + usize::from(patches)
 }
 
-/// One pass for a dispatch: its colors, one after another, and the substep of its block, 64 B.
+/// One pass for a dispatch: consecutive colors, and the substep of their block, 64 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PassRow {

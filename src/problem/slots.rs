@@ -1,8 +1,8 @@
-//! Which manifold has which rows: a slot, from its first step until it ends.
+//! Slots of rows. A manifold keeps its slot from its first step until it ends.
 //!
-//! Rows stay where they are. A step changes only the list of the slots that take part, in the order of the sweeps. Backends are fastest
-//! where slots stand in that order, so that [`super::ContactRows::sort`] sorts all slots where many are new. A step of a pyramid of 125,000
-//! boxes takes 1.12 of the time if slots stay in the order of the pairs.
+//! Rows stay in place. A step changes only the list of the slots that take part, in the order of the sweeps. Backends
+//! are fastest if slots have this order, so [`super::ContactRows::sort`] sorts all slots once many are new. If slots
+//! stay in the order of the pairs, a step of a pyramid of 125,000 boxes takes 1.12 times as long.
 
 use crate::collide::{Change, Detector, NO_SLOT, Pair};
 use crate::graph::{Edge, IMMOVABLE};
@@ -11,11 +11,11 @@ use crate::world::{BodyKind, World};
 /// The part of a slot's rows that the next step writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Write {
-    /// How far apart its points are now.
+    /// The separations of its points.
     Separations,
-    /// Everything but the impulses: the manifold is the same, and masses, materials or settings are others.
+    /// Everything but the impulses: the manifold is the same, but masses, materials or settings differ.
     Rows,
-    /// Everything: the manifold was computed anew, and its points bring their impulses along.
+    /// Everything: the manifold was computed anew, and its points bring their impulses.
     Computed,
     /// Everything: the slot has another manifold, which begins without impulses.
     New,
@@ -23,7 +23,6 @@ pub(super) enum Write {
 
 crate::saved::kinds!(Write { Separations, Rows, Computed, New });
 
-/// One slot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     /// World of the pair.
@@ -33,11 +32,11 @@ pub(super) struct Slot {
     /// Which manifold of the pair.
     pub manifold: u32,
     pub write: Write,
-    /// Whether its manifold is swept; not if it rests, and not if the slot is free.
+    /// Whether the contact is swept. A resting contact and a free slot are not.
     pub takes_part: bool,
     /// Half of the smallest side of the thinner shape (m).
     pub size: f32,
-    /// How deep its contact would sag in class 0 under what it bears for long, over the sag that the settings promise.
+    /// The sag of its contact in class 0 under its lasting load, over the sag that the settings promise.
     pub need: f32,
 }
 
@@ -47,29 +46,29 @@ pub(super) const FREE: Slot =
     Slot { world: u32::MAX, pair: 0, manifold: 0, write: Write::Separations, takes_part: false, size: 0.0, need: 0.0 };
 
 impl Slot {
-    /// Whether no manifold has it.
+    /// Whether no manifold has the slot.
     pub fn is_free(&self) -> bool {
         self.world == FREE.world
     }
 }
 
-/// All slots, those that are free included.
+/// All slots, including the free ones.
 #[derive(Debug, Default)]
 pub(super) struct Slots {
     pub all: Vec<Slot>,
-    /// The edges that the graph colors, one a slot.
+    /// The edges that the graph colors, one for each slot.
     pub edges: Vec<Edge>,
     /// The colliders of each slot, by their indices among those of their bodies a and b.
     pub colliders: Vec<[u32; 2]>,
     pub free: Vec<u32>,
-    /// How many were taken since all were sorted.
+    /// Number of slots taken since the last sort.
     pub taken: usize,
 }
 
 crate::saved::cloned!(Slots { all, edges, colliders, free, taken });
 
 impl Slots {
-    /// Follows the detection: manifolds that began take a slot, those that ended leave theirs.
+    /// Follows the detector: new manifolds take slots, and manifolds that ended free theirs.
     pub fn follow(&mut self, world: &World, detector: &mut Detector) {
         detector.take_changes(&mut |change| match change {
             Change::Ended(slot) => self.release(slot),
@@ -116,7 +115,8 @@ impl Slots {
         }
     }
 
-    /// A slot and its edge as [`Self::follow`] leaves them for the manifold `k` of a pair, where nothing is to be written but separations.
+    /// The slot and edge of the manifold `k` of a pair as [`Self::follow`] leaves them, if only separations are to be
+    /// written.
     pub fn settled(kinds: &[BodyKind], [world, i]: [u32; 2], pair: &Pair, k: u32) -> (Slot, Edge) {
         let movable = |body: u32| if kinds[body as usize] == BodyKind::Dynamic { body } else { IMMOVABLE };
         let slot = Slot { world, pair: i, manifold: k, takes_part: pair.takes_part, size: pair.size, ..FREE };
@@ -147,12 +147,13 @@ impl Slots {
         taken.for_each(|slot| slot.write = slot.write.max(Write::Rows));
     }
 
-    /// Whether so many are new that it pays to sort all: more than half as many as there are.
+    /// Whether enough slots are new that it pays to sort all: more than half of the slots in use.
     pub fn are_unsorted(&self) -> bool {
         2 * self.taken > self.all.len() - self.free.len()
     }
 
-    /// Puts slots into an `order` that begins with those that take part; returns where each was. Free slots vanish.
+    /// Sorts slots into an `order` that begins with those that take part. Returns the former place of each. Free slots
+    /// vanish.
     pub fn sort(&mut self, order: &[u32], detector: &mut Detector) -> Vec<u32> {
         self.free.clear();
         let resting = (0..).zip(&self.all).filter(|(_, slot)| !slot.takes_part && !slot.is_free()).map(|(i, _)| i);
@@ -167,7 +168,7 @@ impl Slots {
         from
     }
 
-    /// Those that take part, ascending.
+    /// The slots that take part, in ascending order.
     pub fn taking_part(&self) -> impl Iterator<Item = u32> {
         (0..).zip(&self.all).filter(|(_, slot)| slot.takes_part).map(|(i, _)| i)
     }

@@ -1,7 +1,7 @@
-//! Soft contacts: a spring and damper in the terms of a constraint.
+//! Soft contacts: a spring and a damper in the form of a constraint.
 //!
-//! Implicit Euler on a spring k = m w² with damper c = 2 z m w, m the effective mass, asks of the velocity
-//! `u + (k / (c + h k)) s + r / (h (c + h k)) = 0`. With a1 = 2 z + h w and a2 = h w a1 that is
+//! Implicit Euler applies to a spring k = m w² with the damper c = 2 z m w, where m is the effective mass. Its
+//! condition on the velocity is `u + (k / (c + h k)) s + r / (h (c + h k)) = 0`. With a1 = 2 z + h w and a2 = h w a1,
 //!
 //! ```text
 //! bias_rate     = k / (c + h k)   = w / a1
@@ -9,8 +9,8 @@
 //! impulse_scale =  1 / (1 + a2)
 //! ```
 //!
-//! and w -> infinity gives the hard contact (1/h, 1, 0). At rest the overlap under a force F is F / (m w²): the law
-//! that `tests/gpu/closed_forms.rs` holds the solver to. Source: Catto, "Soft constraints", 2011; "Solver2D", 2024.
+//! The limit w -> infinity gives the hard contact (1/h, 1, 0). At rest the overlap under a force F is F / (m w²), which
+//! `tests/gpu/closed_forms.rs` checks. Source: Catto, "Soft constraints", 2011; "Solver2D", 2024.
 
 use super::rows::{Softness, Substep};
 use crate::config::{SolverConfig, Stabilization};
@@ -37,7 +37,7 @@ impl Substep {
     }
 }
 
-/// How overlap is removed, for contacts of `ratio` times the frequency.
+/// The law that removes overlap, for contacts of `ratio` times the frequency.
 fn contact_softness(config: &SolverConfig, h: f32, ratio: f32) -> Softness {
     match config.stabilization {
         Stabilization::Soft => {

@@ -1,23 +1,22 @@
-//! What the contacts of a step have in common, in one pass over their rows.
+//! Common facts about the contacts of a step, from one pass over their rows.
 
 use rayon::prelude::*;
 
 use super::{ContactRow, StepProblem};
 
-/// What plans, counts of points and counts of bytes ask of the contacts that take part.
+/// The facts about the contacts that take part that plans, counts of points and counts of bytes need.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ContactSummary {
-    /// Whether any has friction.
+    /// Whether any contact has friction.
     pub friction: bool,
-    /// Whether any can bounce.
+    /// Whether any contact can bounce.
     pub restitution: bool,
-    /// Whether any is made by a round surface, whose radius its rows carry.
+    /// Whether any contact has a round surface, whose radius is in its row.
     pub round: bool,
-    /// Points of the contacts before each color, and of all.
+    /// Number of points before each color, then of all points.
     pub points: Vec<usize>,
 }
 
-/// Contacts that one task goes over.
 const CONTACTS_A_TASK: usize = 2048;
 
 impl ContactSummary {
@@ -43,7 +42,7 @@ impl ContactSummary {
     }
 }
 
-/// Friction, restitution, round surfaces, points.
+/// Facts about some contacts: friction, restitution, round surfaces, number of points.
 type Of = (bool, bool, bool, usize);
 
 const NONE: Of = (false, false, false, 0);

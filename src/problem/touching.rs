@@ -1,4 +1,4 @@
-//! Which contacts of a step touch, and which of them met fast.
+//! The contacts of a step that touch, and those whose surfaces met fast.
 
 use glam::Vec3;
 
@@ -8,13 +8,13 @@ use super::rows::{ContactRow, ImpulseRow};
 use super::write::speed_at_impact;
 use crate::world::World;
 
-/// Two colliders of two bodies: the indices of the bodies, and those of the colliders among the colliders of their bodies.
+/// Two colliders of two bodies: the index of each body, and the index of the collider among those of the body.
 pub type ColliderPair = [(u32, u32); 2];
 
-/// The fastest approach of the surfaces of one contact in a step.
+/// The fastest approach between the surfaces of one contact in a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Approach {
-    /// The colliders, the body with the lesser index first.
+    /// The colliders. The body with the lower index comes first.
     pub pair: ColliderPair,
     /// Midway between the surfaces when the step begins (m).
     pub point: Vec3,
@@ -24,19 +24,19 @@ pub struct Approach {
     pub speed: f32,
     /// Sum of the normal impulses of all points over the step (N s).
     pub impulse: f32,
-    /// Speed along the normal with which the surfaces still approach there after the step (m/s).
+    /// Speed along the normal with which the surfaces still approach at this point after the step (m/s).
     pub rest: f32,
 }
 
 impl ContactRows {
-    /// The contacts that touch: at a point the surfaces press on each other in the course of the step, or overlap when the step begins.
-    /// Contacts that rest stay as they were.
+    /// The contacts that touch: at some point, the surfaces press on each other during the step or overlap when it
+    /// begins. Contacts at rest keep their state.
     pub fn touching<'a>(&'a self, problem: &'a StepProblem) -> impl Iterator<Item = ColliderPair> + 'a {
         self.taken().filter(|&row| touches(&problem.contacts[row], problem)).map(|row| self.pair(row, problem).0)
     }
 
-    /// The contacts that bear something in the step and are `wanted`, by their colliders and their approach speed. `world` is as the step found it, and `substep`
-    /// the length of a substep of class 0 (s).
+    /// The approaches of contacts that carry a load in the step and are `wanted` by their colliders and approach speed.
+    /// `world` is the world before the step, and `substep` is the length of a substep of class 0 (s).
     pub fn approaches<'a>(
         &'a self,
         world: &'a World,
@@ -53,7 +53,7 @@ impl ContactRows {
         })
     }
 
-    /// The colliders of a contact, the body with the lesser index first, and whether the contact has that body as b.
+    /// The colliders of a contact, with the lower body first, and whether this swaps a and b.
     fn pair(&self, row: usize, problem: &StepProblem) -> (ColliderPair, bool) {
         let contact = &problem.contacts[row];
         let [on_a, on_b] = self.colliders_of(row);
@@ -63,8 +63,8 @@ impl ContactRows {
 }
 
 impl StepProblem {
-    /// Impulse of a contact on its body b, summed over the step: normal and friction of all points and of the patch, world axes (N s). The
-    /// problem has totals.
+    /// Impulse of a contact on its body b, summed over the step, in world axes (N s): normal and friction of all points
+    /// and of the patch. Requires the totals of the step.
     pub fn total_impulse(&self, contact: &ContactRow) -> Vec3 {
         let (normal, (tangent_1, tangent_2)) = (Vec3::from_array(contact.normal), contact.tangents());
         let friction = |total: &ImpulseRow| tangent_1 * total.tangent_1 + tangent_2 * total.tangent_2;
@@ -82,7 +82,7 @@ fn touches(contact: &ContactRow, problem: &StepProblem) -> bool {
         || problem.points[own].iter().any(|point| point.separation <= 0.0)
 }
 
-/// The fastest approach of the points that bear something; none where nothing approaches.
+/// The fastest approach among the points with an impulse; `None` if no point has one.
 fn approach(contact: &ContactRow, world: &World, problem: &StepProblem, substep: f32) -> Option<Approach> {
     let [a, b] = [contact.body_a, contact.body_b].map(|i| &world.bodies[i as usize]);
     let [pull_a, pull_b] =

@@ -1,8 +1,9 @@
-//! The content of the rows of contacts: written from a manifold when it is computed, and kept from step to step while it is reused.
+//! Writes the rows of contacts: anew from a computed manifold, or from the rows of the step before while the manifold
+//! is reused.
 //!
-//! Normal, tangents, arms and effective masses of a reused manifold stay, and so do its impulses; only the separations
-//! follow the bodies. The bodies of a reused manifold turned by 0.03 rad at most, and unequal moments of inertia turned with
-//! them: what that changes in the masses is left out, as it is in the arms.
+//! A reused manifold keeps its normal, tangents, arms, effective masses and impulses. Only the separations follow the
+//! bodies. The bodies of a reused manifold have turned by 0.03 rad at most. The change of effective masses and arms by
+//! this turn is neglected.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -28,7 +29,7 @@ pub(super) struct Writer<'a> {
     pub detector: &'a Detector,
     pub config: &'a SolverConfig,
     pub effort: &'a Effort,
-    /// Whether a class is not what the rows of the step before were written for.
+    /// Whether a class differs from that of the rows of the step before.
     pub effort_changes: bool,
     /// Length of a substep of class 0 (s).
     pub substep: f32,
@@ -37,13 +38,13 @@ pub(super) struct Writer<'a> {
     pub poses: &'a [PoseRow],
     /// The coefficients of the preloads.
     pub carry: &'a Carry,
-    /// Whether rows that are written again bring impulses to the points that they have now; else impulses stay as they are.
+    /// Whether rows that are written again move impulses to the present points. If not, impulses stay in place.
     pub brings_impulses: bool,
     /// Whether a patch follows the points of every contact.
     pub patches: bool,
     /// The materials that hooks gave to contacts, by slot; empty if they gave none.
     pub hooked: &'a [Option<Material>],
-    /// Whether a surface has so much friction that contacts may jam.
+    /// Whether any surface has enough friction that contacts may jam.
     pub may_jam: bool,
 }
 
@@ -57,10 +58,9 @@ pub(super) struct SlotRows<'a> {
     pub jams: &'a mut [bool],
 }
 
-/// Slots that one task writes.
 pub(super) const SLOTS_A_TASK: usize = 256;
 
-/// Some of the slots of a task, ascending.
+/// Some of the slots of a task, in ascending order.
 pub(super) struct Chosen {
     slots: [u32; SLOTS_A_TASK],
     count: usize,
@@ -97,7 +97,7 @@ impl Writer<'_> {
         });
     }
 
-    /// Writes the rows of the slots from the number `first` on.
+    /// Writes the rows of consecutive slots, the first of which has the number `first`.
     fn write_some(&self, first: usize, slots: &[Slot], mut rows: SlotRows) {
         let stride = points_a_slot(self.patches);
         let written = Chosen::of(slots, |slot| slot.write != Write::Separations);
@@ -130,7 +130,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Writes all of these slots that follows from their manifolds, materials and masses.
+    /// Writes the values of chosen slots that follow from their manifolds, materials and masses.
     pub fn write_rows(&self, first: usize, slots: &[Slot], written: &Chosen, rows: &mut SlotRows) {
         let stride = points_a_slot(self.patches);
         for &i in written.all() {
@@ -168,7 +168,7 @@ impl Writer<'_> {
         InstructionSet::default().run(&work, 0..slots.len().div_ceil(WIDTH));
     }
 
-    /// Writes all of a slot that does not follow from numbers of other rows.
+    /// Writes the values of a slot that do not follow from other rows.
     fn write_slot(&self, slot: &Slot, (number, i): (usize, usize), rows: &mut SlotRows) {
         let stride = points_a_slot(self.patches);
         let contact = &mut rows.contacts[i];
@@ -190,7 +190,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Brings a contact to the substeps of its island.
+    /// Adjusts a contact to the substeps of its island.
     fn follow_effort(&self, contact: &mut ContactRow, points: &[PointRow], impulses: &mut [ImpulseRow]) {
         let share = self.share(contact);
         if share != contact.substep_share {
@@ -222,8 +222,8 @@ impl Writer<'_> {
         };
     }
 
-    /// Brings the impulses of a slot to the points that its manifold has now, and to its tangents. Double of the function of the same
-    /// name in `shaders/resident/write_contacts.wgsl`.
+    /// Moves the impulses of a slot to the present points and tangents of its manifold. Twin of the function of the
+    /// same name in `shaders/resident/write_contacts.wgsl`.
     fn bring_impulses(
         &self,
         write: Write,
@@ -253,8 +253,8 @@ impl Writer<'_> {
         self.effort.share(if is_movable(row.body_a) { row.body_a } else { row.body_b } as usize)
     }
 
-    /// The velocities of a row when the step begins: the velocity of the approach where it may bounce, and the direction
-    /// of the slip where friction has one only.
+    /// Writes the velocities of a point when the step begins: its approach velocity, and the slip direction if friction
+    /// has only one direction.
     fn approach(&self, row: &ContactRow, point: &mut PointRow) {
         let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
         let [a, b] = [row.body_a, row.body_b].map(|i| &self.bodies[i as usize]);
@@ -277,7 +277,7 @@ impl Writer<'_> {
     }
 }
 
-/// Which of the points that a slot had is this one, the point `k` of its manifold.
+/// The index that the point `k` of a manifold had among the former points of its slot; `None` for a new point.
 pub(super) fn point_before(write: Write, k: usize, point: &ManifoldPoint) -> Option<u8> {
     match write {
         Write::Separations | Write::Rows => Some(k as u8),
@@ -286,7 +286,7 @@ pub(super) fn point_before(write: Write, k: usize, point: &ManifoldPoint) -> Opt
     }
 }
 
-/// An impulse along the tangents that a manifold has now. Friction that a rule no longer allows is not brought along.
+/// An impulse along the present tangents of a manifold. Friction that a rule no longer allows is dropped.
 fn retangented(before: &ContactRow, now: &ContactRow, impulse: &ImpulseRow) -> ImpulseRow {
     let (tangent_1, tangent_2) = before.tangents();
     let friction = tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
@@ -298,10 +298,11 @@ fn retangented(before: &ContactRow, now: &ContactRow, impulse: &ImpulseRow) -> I
 
 /// Normal velocity whose opposite, times the restitution `e`, gives back the energy of the approach.
 ///
-/// `vn` is the normal velocity when the step begins, `pull` the relative acceleration along the normal, `gap` the distance
-/// still to go and `h` the substep. Two corrections: what the surfaces gain on the way, and that the velocities of the
-/// integrator stand half a substep ahead of the parabola that its positions lie on, before the bounce and after it.
-/// Without them a perfectly elastic ball that fell 5 m lost 2.3 % of its energy in 20 s at steps of 1 ms.
+/// `vn` is the normal velocity when the step begins, `pull` the relative acceleration along the normal, `gap` the
+/// remaining distance, and `h` the substep. The velocity has two corrections. The first is the speed that the surfaces
+/// gain until they meet. The second exists because the integrator's velocities are half a substep ahead of the parabola
+/// of its positions, both before and after the bounce. Without them a perfectly elastic ball that fell 5 m lost 2.3 %
+/// of its energy in 20 s at steps of 1 ms.
 fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
     if vn >= 0.0 || e == 0.0 {
         return vn;
@@ -310,14 +311,14 @@ fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
     -(speed_at_impact(vn, pull, gap, ahead) - ahead / e)
 }
 
-/// Speed with which surfaces meet, on the parabola of their positions, which velocities stand so much `ahead` of (m/s); the other numbers
-/// are those of [`velocity_at_impact`].
+/// Speed of surfaces that meet on the parabola of their positions (m/s). Velocities are `ahead` of the parabola by that
+/// much (m/s). The other arguments are those of [`velocity_at_impact`].
 pub(super) fn speed_at_impact(vn: f32, pull: f32, gap: f32, ahead: f32) -> f32 {
     let approach = (vn + ahead).min(0.0);
     (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt()
 }
 
-/// The row that stands for the friction of all `points`, which learn how far from it they are.
+/// The row for the joint friction of all `points`. It also writes their distances from the patch.
 fn patch_of(effective: &EffectiveMass, points: &mut [PointRow]) -> PointRow {
     let share = inverse_or_zero(points.len() as f32);
     let middle = |arm: fn(&PointRow) -> [f32; 3]| {

@@ -30,7 +30,6 @@ fn begin(aabb: &Aabb, enters: f32) -> f32 {
     (((enters - diagonal) / unit).floor() * unit).max(0.0)
 }
 
-/// Whether a shape contains a point.
 pub(super) fn contains(shape: &Shape, pose: &Pose, point: Vec3) -> bool {
     !is_surface(&*shape.0) && shape.0.contains_point(pose, point)
 }

@@ -1,4 +1,4 @@
-//! How one body is borne: the forces at the points that it rests on.
+//! The forces at the points that one body rests on.
 
 use glam::DVec3;
 
@@ -10,7 +10,7 @@ pub(super) struct Wrench {
 }
 
 impl Wrench {
-    /// Adds a force at an arm.
+    /// Adds a force that acts at an arm.
     pub fn add(&mut self, force: DVec3, arm: DVec3) {
         self.force += force;
         self.moment += arm.cross(force);
@@ -24,12 +24,12 @@ pub(super) struct Point {
     pub arm: DVec3,
     /// The normal, toward the body, and two tangents.
     pub axes: [DVec3; 3],
-    /// The mass that the point feels along the normal (kg).
+    /// The effective mass of the point along the normal (kg).
     pub mass: f64,
     pub friction: f64,
-    /// The first point of its manifold, by its number among the points of the body.
+    /// The first point of its manifold, as an index among the points of the body.
     pub manifold: u32,
-    /// Whether the surfaces touch there.
+    /// Whether the surfaces touch at the point.
     pub bears: bool,
 }
 
@@ -40,17 +40,17 @@ impl Point {
     }
 }
 
-/// Stiffness of single points, and of friction, beside that of whole manifolds. A manifold has one preload, so that its points shall bear
-/// alike where they can.
+/// Stiffness of single points, and of friction, relative to that of whole manifolds. A manifold has one preload, so its
+/// points should carry equal loads where they can.
 const TILT: f64 = 0.02;
 const SLIP: f64 = 0.02;
-/// The part of a load that may stay unbalanced.
+/// The share of a load that may stay unbalanced.
 const UNBALANCED: f64 = 1e-4;
-/// Stiffness, over the largest, against motions that no point resists.
+/// Stiffness against motions that no point resists, relative to the largest stiffness.
 const NO_RESISTANCE: f64 = 1e-10;
-/// Most rounds in which points are let go and friction is limited.
+/// Most rounds of letting go of points and limiting friction.
 const ROUNDS: usize = 24;
-/// Forces below this part of the largest are rounding.
+/// Forces below this share of the largest force are rounding errors.
 const ROUNDING: f64 = 1e-9;
 
 type Six = [f64; 6];
@@ -80,20 +80,22 @@ struct Spring {
 #[derive(Default)]
 pub(super) struct Balance {
     springs: Vec<Spring>,
-    /// Of each manifold, at its first point: the mean motion of its points along the normal, and the sum of their masses.
+    /// For each manifold, at its first point: the mean motion of its points along the normal, and the sum of their
+    /// masses.
     means: Vec<(Six, f64)>,
     forces: Vec<[f64; 3]>,
 }
 
 impl Balance {
-    /// Forces along the axes of `points` that balance `load`, none of which pulls, and no friction beyond its limit.
+    /// Forces along the axes of `points` that balance `load`, without pull and with friction within its limit; `None`
+    /// if there are none.
     ///
-    /// The body stands on springs: one under each manifold, which all of its points press alike, a weaker one under each point, and weak ones
-    /// along the tangents. Their forces are those of the least energy that balance the load. A point whose spring would pull is let go,
-    /// and friction beyond its limit makes its springs weaker.
+    /// The body stands on springs: one beneath each manifold, which all its points press equally, a weaker one beneath
+    /// each point, and weak ones along the tangents. Their forces are those with the least energy that balance the
+    /// load. A point whose spring would pull is let go. Friction beyond its limit weakens its springs.
     pub fn of(&mut self, load: &Wrench, points: &[Point]) -> Option<&[[f64; 3]]> {
         let bearing = || points.iter().filter(|point| point.bears);
-        // Moments over this length are forces.
+        // Moments divided by this length are forces.
         let unit = bearing().map(|point| point.arm.length()).reduce(f64::max)?;
         let wanted = six(-load.force, -load.moment / unit);
         self.springs.clear();
@@ -109,7 +111,7 @@ impl Balance {
         (is_within && self.are_balanced(&wanted)).then_some(&self.forces)
     }
 
-    /// The forces of the springs on a body that they balance.
+    /// Computes the forces of the springs when they balance the load.
     fn press(&mut self, points: &[Point], wanted: &Six) {
         self.means.clear();
         self.means.resize(points.len(), ([0.0; 6], 0.0));
@@ -143,7 +145,7 @@ impl Balance {
         }));
     }
 
-    /// Whether no point pulls and no friction is beyond its limit. Else those springs end or get weaker.
+    /// Whether no point pulls and all friction is within its limit. If not, the springs at fault end or weaken.
     fn are_within_limits(&mut self, points: &[Point]) -> bool {
         let most = self.forces.iter().fold(0.0_f64, |most, force| most.max(force[0]));
         let mut are_within = true;
@@ -167,7 +169,7 @@ impl Balance {
         are_within
     }
 
-    /// Whether the forces give what is wanted.
+    /// Whether the forces balance the load.
     fn are_balanced(&self, wanted: &Six) -> bool {
         let mut rest = *wanted;
         for (along, force) in self.springs.iter().zip(&self.forces).flat_map(|(s, f)| s.along.iter().zip(f)) {
@@ -183,12 +185,13 @@ fn add_square(rows: &mut [Six; 6], x: &Six, factor: f64) {
     }
 }
 
-/// The solution of a symmetric system, of which `rows` has the lower triangle. It is made definite, and refined once.
+/// The solution of a symmetric system. `rows` holds the lower triangle. The matrix is made definite, and the solution
+/// is refined once.
 fn solved(rows: &[Six; 6], wanted: &Six) -> Six {
     let largest = (0..6).fold(0.0, |most: f64, i| most.max(rows[i][i]));
     let mut factor = *rows;
     (0..6).for_each(|i| factor[i][i] += NO_RESISTANCE * largest);
-    // L D Lᵀ, in its place.
+    // L D Lᵀ in place.
     for j in 0..6 {
         for i in j..6 {
             factor[i][j] -= (0..j).map(|k| factor[i][k] * factor[j][k] * factor[k][k]).sum::<f64>();
@@ -252,7 +255,7 @@ mod tests {
         assert!(found.iter().all(|f| (f[0] - 10.0).abs() < 1e-6 && f[1].hypot(f[2]) < 1e-6), "{found:?}");
     }
 
-    /// Over a corner the corner across from it would pull.
+    /// With the load over one corner, the opposite corner would pull.
     #[test]
     fn a_load_beside_the_middle_presses_that_side_and_beyond_the_edge_tips() {
         for (x, z, stands) in [(0.5, 0.0, true), (0.9, 0.0, true), (0.9, 0.8, true), (1.1, 0.0, false)] {
@@ -267,7 +270,7 @@ mod tests {
         }
     }
 
-    /// On a slope of 0.4 rad friction of 0.5 suffices, on one of 0.5 rad (tan 0.546) it does not.
+    /// Friction of 0.5 holds on a slope of 0.4 rad, but not on a slope of 0.5 rad (tan 0.546).
     #[test]
     fn friction_holds_up_to_its_limit() {
         let low = square().map(|point| Point { arm: point.arm * DVec3::new(1.0, 0.2, 1.0), ..point });
@@ -281,14 +284,14 @@ mod tests {
         }
     }
 
-    /// Two manifolds under a beam: each presses its points alike where that balances.
+    /// Two manifolds beneath a beam. Each presses its points equally where this balances.
     #[test]
     fn the_points_of_a_manifold_bear_alike_where_they_can() {
         let points = [(2.5, 0), (1.5, 0), (-0.5, 2), (-1.5, 2)].map(|(x, manifold)| Point { manifold, ..at(x, 0.0) });
         let (force, moment) = (DVec3::NEG_Y * 40.0, DVec3::X.cross(DVec3::NEG_Y * 40.0));
         let found = forces(force, moment, &points).expect("it stands");
         assert_balanced(force, moment, &points, &found);
-        // Springs under single points alone would bear 16, 13.3, 7 and 4 N or the like.
+        // With springs beneath single points alone, the forces would be about 16, 13.3, 7 and 4 N.
         assert!(
             (found[0][0] / found[1][0] - 1.0).abs() < 0.01 && (found[2][0] / found[3][0] - 1.0).abs() < 0.01,
             "{found:?}"

@@ -1,12 +1,13 @@
-//! The impulses and preloads with which a structure that is built in place begins.
+//! The first impulses and preloads of a structure that is built in place.
 //!
-//! Sweeps hand a load on by one contact a sweep, so that a tall structure sinks in and comes up again before its foot bears it. Statics knows
-//! the loads before the first step. Bodies are gone through from the top: each hands its weight, and the load that it bears, on to the points
-//! that it rests on ([`bearing::balance`]). A body that no such forces balance is about to fall: it begins without impulses, and so does
-//! everything that rests on it.
+//! A sweep passes a load on by one contact. A tall structure would therefore sink in and rise again before its foot
+//! carries the load. Statics gives the loads before the first step. It goes through the bodies from the top. Each body
+//! passes its weight, and the load on it, to the points that it rests on ([`Balance::of`]). A body without a
+//! balance of forces is about to fall. It begins without impulses, and so does everything that rests on it.
 //!
-//! A body is new that lies still and touches nothing that it touched before: all bodies in the first step, and later those that the caller
-//! places. Bodies under it that lie there already hand its load on, beside the impulses that they have. Derivation: docs/derivation.md.
+//! A body is new if it lies still and has only new contacts. In the first step these are all bodies, later those that
+//! the caller places. Old bodies beneath them pass the load on, in addition to their own impulses. Derivation:
+//! docs/derivation.md.
 
 mod bearing;
 
@@ -20,13 +21,14 @@ use crate::problem::{BodyRow, ContactRow, ContactRows, PointRow, StepProblem};
 use crate::world::{Body, World};
 use bearing::{Balance, Point, Wrench};
 
-/// Sine of the slope above which a contact does not bear: its normal rises by less.
+/// Smallest rise of the normal of a supporting contact, as the sine of its angle from the horizontal.
 const LEAST_RISE: f64 = 0.01;
-/// Most rounds in which everything that rests on falling bodies is let go.
+/// Most rounds in which bodies that rest on falling bodies are let go.
 const ROUNDS: usize = 16;
 
-/// Gives the contacts of new bodies, and those that bear them, the impulses and preloads that they rest with. The rows are written. `substep` is
-/// the length of a substep of class 0 (s). Returns the bodies that lie on others which can move, and that no forces balance.
+/// Gives impulses and preloads at rest to the contacts of new bodies, and to those that carry them. The rows must be
+/// written. `substep` is the length of a substep of class 0 (s). Returns the bodies without a balance of forces that
+/// lie on movable bodies.
 pub(crate) fn begin(
     world: &World,
     config: &SolverConfig,
@@ -45,32 +47,32 @@ pub(crate) fn begin(
     structure.unbalanced
 }
 
-/// A contact through which one body bears another.
+/// A contact through which one body supports another.
 #[derive(Clone, Copy)]
 struct Bearing {
     row: u32,
     upper: u32,
     lower: u32,
-    /// 1 if the upper body is b of the row, else -1: the impulses of a row act on b.
+    /// 1 if the upper body is b of the row, otherwise -1. The impulses of a row act on b.
     sign: f64,
 }
 
-/// The bodies that lie, and the contacts that bear them.
+/// The bodies that rest on others, and the contacts that support them.
 struct Structure {
-    /// Those of one upper body after those of another.
+    /// The contacts, grouped by upper body.
     bearings: Vec<Bearing>,
-    /// Where the bearings of each upper body begin.
+    /// The first bearing of each upper body.
     bearings_of: Vec<u32>,
-    /// Where the points of each bearing begin.
+    /// The first point of each bearing.
     points_of: Vec<u32>,
     /// Forces on the upper bodies along the axes of the points (N).
     forces: Vec<[f64; 3]>,
     /// Bodies that begin without impulses.
     falls: Vec<bool>,
-    /// Those of them that no forces balance, though they lie on bodies that can move.
+    /// The falling bodies without a balance of forces that lie on movable bodies.
     unbalanced: Vec<u32>,
-    /// How deep each body sags by its own weight in class 0 (m): so far apart may surfaces be that bear. Of bodies that gravity moves less than
-    /// others, how deep the others would.
+    /// The sag of each body under its own weight in class 0 (m). Surfaces up to this distance apart count as touching.
+    /// A gravity scale below 1 counts as 1.
     sags: Vec<f64>,
     has_friction: bool,
 }
@@ -89,7 +91,7 @@ impl Structure {
         let bearing = |&row: &u32| {
             let gravity =
                 gravity_at(problem.contacts[row as usize].body_a).filter(|gravity| *gravity != DVec3::ZERO)?;
-            // Bodies that are slower are held by something: gravity makes them faster in a substep.
+            // A free body reaches this speed in a substep, so a slower body has a support.
             bearing(row, gravity, gravity.length() * f64::from(substep), problem)
         };
         let mut bearings: Vec<Bearing> = contacts.coloring.order.iter().filter_map(bearing).collect();
@@ -121,7 +123,7 @@ impl Structure {
         self.points_of[bearings.start] as usize..self.points_of[bearings.end] as usize
     }
 
-    /// The points of the bearings of one upper body.
+    /// Writes the points of the bearings of one upper body.
     fn write_points(&self, bearings: Range<usize>, is_new: bool, problem: &StepProblem, points: &mut Vec<Point>) {
         points.clear();
         for bearing in &self.bearings[bearings] {
@@ -142,8 +144,8 @@ impl Structure {
         }
     }
 
-    /// Hands the weights of new bodies down. False if something rests on a body that falls, so that it falls too: its load is then to be left
-    /// out.
+    /// Passes the weights of new bodies down. Returns false if more bodies fall because they rest on a falling body.
+    /// The caller then repeats it without their loads.
     fn hand_down(&mut self, is_new: &[bool], problem: &StepProblem) -> bool {
         let mut loads = vec![Wrench::default(); is_new.len()];
         for ((load, mass), _) in loads.iter_mut().zip(&problem.masses).zip(is_new).filter(|(_, is_new)| **is_new) {
@@ -190,14 +192,14 @@ impl Structure {
                 }
             }
         }
-        // Bodies that bear each other in a circle are never ready.
+        // Bodies that support each other in a circle are never ready.
         for (body, is_done) in (0..).zip(is_done) {
             self.falls[body as usize] |= !is_done && is_movable(body);
         }
         !self.let_go()
     }
 
-    /// Lets everything fall that rests on what falls; whether there was anything.
+    /// Lets everything fall that rests on falling bodies, and returns whether there was anything.
     fn let_go(&mut self) -> bool {
         let mut any = false;
         loop {
@@ -245,7 +247,7 @@ impl Structure {
                 apart += row.normal_mass * row.separation;
             }
             if has_preloads {
-                // The surfaces stay as far apart as they are.
+                // The preload keeps the present separation.
                 let apart = if contacts.new_bodies()[bearing.upper as usize] { apart } else { 0.0 };
                 let yielding = contacts.carry.preload.yielding(contact.substep_share, are_movable, pressed);
                 contact.preload += (yielding + apart) / mass;
@@ -254,7 +256,7 @@ impl Structure {
     }
 }
 
-/// The contact in a row, if one of its bodies lies on the other.
+/// The contact in a row as a bearing, if one of its bodies lies on the other.
 fn bearing(row: u32, gravity: DVec3, slow: f64, problem: &StepProblem) -> Option<Bearing> {
     let contact = &problem.contacts[row as usize];
     let (a, b) = (contact.body_a, contact.body_b);
@@ -277,7 +279,6 @@ fn arms(row: &PointRow, bearing: &Bearing) -> (DVec3, DVec3) {
     if bearing.sign > 0.0 { (b, a) } else { (a, b) }
 }
 
-/// The rows of the points of a contact.
 fn points_of_row<'a, T>(contact: &ContactRow, rows: &'a [T]) -> &'a [T] {
     &rows[contact.first_point as usize..][..contact.point_count as usize]
 }

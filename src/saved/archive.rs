@@ -23,7 +23,7 @@ pub(crate) trait Archive: Sized {
     /// Writes or reads a number in groups of seven bits.
     fn number(&mut self, number: &mut u64) -> Result<()>;
 
-    /// Writes or reads a count of things. Each thing takes at least one bit, so a count above the number of bits is
+    /// Writes or reads a count of items. Each item takes at least one bit, so a count above the number of bits is
     /// refused.
     fn count(&mut self, count: usize) -> Result<usize>;
 
@@ -39,10 +39,10 @@ pub(crate) trait Archive: Sized {
     /// Writes or reads with `walk`. Content with the same bytes as earlier content takes a byte or two.
     fn repeated(&mut self, walk: impl FnMut(&mut Self) -> Result<()>) -> Result<()>;
 
-    /// Walks `count` things. A thing with the same bytes as the one before takes no space.
+    /// Walks `count` items. An item with the same bytes as the one before takes no space.
     fn runs(&mut self, count: usize, walk: impl FnMut(usize, &mut Self) -> Result<()>) -> Result<()>;
 
-    /// Writes or reads `count` things in columns, on all threads, [`CHUNK`] neighbors at a time. Returns the results of
+    /// Writes or reads `count` items in columns, on all threads, [`CHUNK`] neighbors at a time. Returns the results of
     /// `walk` for each chunk.
     fn chunks<T: Send>(
         &mut self,
@@ -52,10 +52,10 @@ pub(crate) trait Archive: Sized {
     ) -> Result<Vec<T>>;
 }
 
-/// Number of things in one chunk. The bytes are the same for any number of threads.
+/// Number of items in one chunk. The bytes are the same for any number of threads.
 const CHUNK: usize = 2048;
 
-/// The chunks of `count` things.
+/// The chunks of `count` items.
 fn chunks_of(count: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
     (0..count.div_ceil(CHUNK)).into_par_iter().map(move |chunk| chunk * CHUNK..((chunk + 1) * CHUNK).min(count))
 }
@@ -180,7 +180,7 @@ impl Archive for Writer {
     }
 }
 
-/// A value that several things share.
+/// A value that several items share.
 type Shared = Box<dyn Any + Send + Sync>;
 
 /// An archive that reads.

@@ -13,7 +13,7 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// New columns for writing, each with room for one number per thing.
+    /// New columns for writing, each with room for one number per item.
     pub fn new(columns: usize, things: usize) -> Self {
         Self { all: (0..columns).map(|_| Vec::with_capacity(things)).collect(), next: None }
     }

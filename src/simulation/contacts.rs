@@ -1,5 +1,5 @@
-//! The contacts of the last step, for callers that borrow the simulation. Only data on the host is used, no device is
-//! asked.
+//! The contacts of the last step, for callers that borrow the simulation. They use only data on the host, and read
+//! nothing from a device.
 
 use glam::Vec3;
 

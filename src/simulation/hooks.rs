@@ -1,4 +1,4 @@
-//! Code of the caller that refuses pairs and changes contacts within a step.
+//! The caller's code that refuses pairs and changes contacts within a step.
 
 use glam::Vec3;
 
@@ -54,25 +54,25 @@ use crate::world::{Body, Material, World};
 /// # Ok::<(), drystone::Error>(())
 /// ```
 pub trait ContactHooks: Send {
-    /// Whether two colliders may touch in this step. `a` is of the body with the smaller index. Each step asks for
-    /// every pair whose boxes overlap and of which a body is awake or moves, before it computes contacts. A refused
-    /// pair costs nothing more, and its bodies pass through each other at any speed. Groups and joints are asked first;
-    /// sensors do not ask. All pairs may touch unless this is implemented.
+    /// Whether two colliders may touch in this step. `a` belongs to the body with the smaller index. Before a step
+    /// computes contacts, it asks for every pair whose boxes overlap and that has an awake or moving body. A refused
+    /// pair costs nothing more, and its bodies pass through each other at any speed. Groups and joints are checked
+    /// first, and sensors are never asked. By default all pairs may touch.
     fn may_touch(&mut self, world: &World, a: ColliderOf, b: ColliderOf) -> bool {
         let _ = (world, a, b);
         true
     }
 
     /// Changes a contact before the step solves it: its friction, its restitution, and which of its points act. Each
-    /// step calls it for every contact of an awake body, also where the surfaces are only near, with the values that
-    /// follow from the materials. A contact from which points are dropped is computed anew in every step, and does not
-    /// rest as still as a reused one.
+    /// step calls it for every contact of an awake body, even if the surfaces are only near, with the values from the
+    /// materials. A contact with dropped points is computed anew in every step, and does not come to rest as well as a
+    /// reused contact.
     fn modify(&mut self, world: &World, contact: &mut PendingContact) {
         let _ = (world, contact);
     }
 }
 
-/// A contact that a step has found and not yet solved, over one pair of convex parts: see [`ContactHooks::modify`].
+/// A contact that a step has found but not yet solved, over one pair of convex parts: see [`ContactHooks::modify`].
 ///
 /// ```
 /// use drystone::{Body, ContactHooks, PendingContact, PendingPoint, Reference, Shape, Simulation, SolverConfig, World};
@@ -125,7 +125,7 @@ pub struct PendingPoint {
     pub position: Vec3,
     /// Distance along the normal, negative for overlap (m). A change has no effect.
     pub separation: f32,
-    /// Whether the point takes no part in this step. A contact all of whose points are dropped does not touch.
+    /// Whether the step ignores this point. A contact does not touch if all its points are dropped.
     pub is_dropped: bool,
 }
 
@@ -152,7 +152,7 @@ impl PendingContact {
         &self.points[..self.count]
     }
 
-    /// The same, to drop some.
+    /// The contact points, for changes.
     pub fn points_mut(&mut self) -> &mut [PendingPoint] {
         &mut self.points[..self.count]
     }
@@ -163,12 +163,12 @@ impl PendingContact {
 pub(super) struct Modified {
     /// Whether points were dropped.
     pub points: bool,
-    /// Whether the material of a contact is another than in the step before.
+    /// Whether the material of a contact differs from that of the step before.
     pub materials: bool,
 }
 
 impl Stages {
-    /// Lets hooks change the contacts that take part in the step; without hooks, contacts get their own materials back.
+    /// Lets hooks change the contacts that take part in the step. Without hooks, contacts get their own materials back.
     ///
     /// # Errors
     /// A material is out of range.

@@ -24,7 +24,7 @@ pub struct StepInput {
 crate::saved::fields!(StepInput { dt, change, config, woken, hash });
 
 impl StepInput {
-    /// Makes the caller's changes in a simulation that stands before the step.
+    /// Makes the caller's changes in a simulation before the step.
     ///
     /// # Errors
     /// The settings contradict each other.
@@ -67,8 +67,8 @@ impl InputWriter {
         &self.world
     }
 
-    /// Whether the simulation left the known state otherwise than by changes of the caller: by a step, or to another
-    /// state.
+    /// Whether the simulation left the known state by a step or by a jump to another state, and not only by changes of
+    /// the caller.
     pub fn is_behind(&self, simulation: &Simulation) -> bool {
         self.state != simulation.state()
     }
@@ -94,7 +94,7 @@ impl InputWriter {
     /// The bytes of an input. They name shapes of earlier inputs by number.
     ///
     /// # Errors
-    /// None; writing to memory never fails.
+    /// No error is possible: writing to memory never fails.
     pub fn write(&mut self, input: &mut StepInput) -> Result<Vec<u8>> {
         self.shapes = Writer::behind(std::mem::take(&mut self.shapes));
         input.walk(&mut self.shapes)?;

@@ -272,9 +272,9 @@ impl Bodies {
         Err(match self.all.get(index) {
             _ if !handle.tag.fits(self.tag) => input!("names body {index} of another world"),
             None => input!("names body {index}, beyond the last of {count}"),
-            Some(_) if self.is_vacant(index) => input!("names body {index}, which is gone"),
+            Some(_) if self.is_vacant(index) => input!("names body {index}, which was removed"),
             Some(other) => input!(
-                "names body {index}, which is gone: {:?} has its index now (an index names only the first body there; use a handle)",
+                "names body {index}, which was removed: {:?} has its index now (an index names only the first body there; use a handle)",
                 other.name
             ),
         })

@@ -257,8 +257,8 @@ pub struct Body {
     /// them. About the other axes the body rotates as on bearings, by its inertia about those axes, and without
     /// gyroscopic torque. Only for dynamic bodies; no axis is locked by default.
     pub locked_rotations: [bool; 3],
-    /// Whether the body may fall asleep; true by default. A body that may not sleep keeps all bodies awake that touch it
-    /// or are joined to it. Only for dynamic bodies.
+    /// Whether the body may fall asleep; true by default. A body that may not sleep keeps all bodies awake that touch
+    /// it or are joined to it. Only for dynamic bodies.
     pub can_sleep: bool,
     /// Mass, center of mass and inertia; zero unless the body is dynamic. A later change of [`Self::colliders`] or
     /// [`Self::kind`] does not change them: call [`Self::update_mass`]. A simulation raises a moment of inertia that is
@@ -604,7 +604,8 @@ impl Body {
         self
     }
 
-    /// Sets the rate at which the linear velocity decays (1/s), 0 or more: [the field](Body#structfield.linear_damping).
+    /// Sets the rate at which the linear velocity decays (1/s), 0 or more: [the
+    /// field](Body#structfield.linear_damping).
     ///
     /// ```
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
@@ -731,15 +732,15 @@ impl Body {
         self.mass.check().map_err(|error| match self.weight {
             Weight::Given => error,
             _ if self.mass.mass == 0.0 && self.solids().next().is_none() => {
-                input!("mass = 0 kg: a dynamic body needs a shape that is no sensor, or mass_properties")
+                input!("mass = 0 kg: a dynamic body needs a shape other than a sensor, or mass_properties")
             }
             Weight::Density(density) if !(density > 0.0 && density.is_finite()) => {
                 input!("density = {density} kg/m³: must be a number above 0")
             }
             Weight::Total(mass) if !MassProperties::MASSES.contains(&mass) => {
-                input!("mass = {mass:e} kg, by total_mass: must be 1e-15 to 1e15")
+                input!("total_mass = {mass:e} kg: must be 1e-15 to 1e15 kg")
             }
-            _ if self.mass.mass == 0.0 => input!("{error}; Body::update_mass takes that of the shapes"),
+            _ if self.mass.mass == 0.0 => input!("{error}; call Body::update_mass to compute the mass from the shapes"),
             _ => error,
         })
     }
@@ -823,7 +824,6 @@ impl Body {
         a.material_of(colliders[0]).combine(b.material_of(colliders[1]))
     }
 
-    /// The material of a collider.
     fn material_of(&self, collider: u32) -> Material {
         self.colliders.get(collider as usize).and_then(|c| c.material).unwrap_or(self.material)
     }
@@ -838,8 +838,8 @@ impl Body {
         Surface { mass: self.mass, locked_rotations: self.locked_rotations, material: self.material }
     }
 
-    /// Inverse inertia in world axes (1/(kg m²)): the inverse of the inertia about the axes that are not locked, and zero
-    /// about the locked ones. Zero unless the body is dynamic.
+    /// Inverse inertia in world axes (1/(kg m²)): the inverse of the inertia about the axes that are not locked, and
+    /// zero about the locked ones. Zero unless the body is dynamic.
     pub fn world_inverse_inertia(&self) -> Mat3 {
         if !self.has_locked_rotation() {
             return self.mass.world_inverse_inertia(self.rotation);
@@ -848,7 +848,7 @@ impl Body {
         if self.has_fixed_rotation() || size <= 0.0 {
             return Mat3::ZERO;
         }
-        // By their size, so that no product leaves the range of numbers. A locked axis is put apart from the others.
+        // Scale by the size, so that no product overflows. Separate locked axes from the others.
         let mut inertia = self.mass.world_inertia(self.rotation).as_dmat3() * size.recip();
         let locked = (0..3).filter(|&k| self.locked_rotations[k]);
         for k in locked.clone() {
@@ -1056,7 +1056,7 @@ impl Body {
             let fits = (self.kind != BodyKind::Kinematic && !c.sensor) || !c.shape.is_half_space();
             ensure(fits, || "half-spaces are for fixed bodies only, and cannot be sensors".into())?;
             let fits = self.kind != BodyKind::Dynamic || c.sensor || c.shape.has_volume();
-            ensure(fits, || "half-spaces, meshes and height fields have no mass: not for dynamic bodies".into())
+            ensure(fits, || "a dynamic body cannot have half-spaces, meshes or height fields: they have no mass".into())
         };
         let mut shapes = self.colliders.iter().enumerate();
         shapes.try_for_each(|(k, c)| check(c).map_err(|e| e.within(format_args!("shapes[{k}]"))))

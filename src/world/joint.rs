@@ -65,7 +65,8 @@ pub struct Joint {
     pub anchor_b: Vec3,
     /// Rotation from the axes of the joint to the frame of a.
     pub frame_a: Quat,
-    /// Rotation from the axes of the joint to the frame of b, or to the world. Angles are zero where the two frames agree.
+    /// Rotation from the axes of the joint to the frame of b, or to the world. Angles are zero where the two frames
+    /// agree.
     pub frame_b: Quat,
     /// Which positions the anchor of a can take.
     pub linear: Linear,

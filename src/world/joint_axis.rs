@@ -79,7 +79,7 @@ pub enum Drive {
         /// The largest total force or torque of spring and damper (N, N m).
         max_load: f32,
     },
-    /// A spring and damper with constants of their own, whatever mass they move.
+    /// A spring and damper with constants of their own, independent of the mass that they move.
     SpringDamper {
         /// The rest position (m, rad).
         target: f32,

@@ -153,7 +153,7 @@ impl Joint {
         check_rotation("frame_a", self.frame_a)?;
         check_rotation("frame_b", self.frame_b)?;
         let message = || {
-            "all of its axes are locked: limits, motors and springs need a free one, as hinge, slider, rope or generic give".into()
+            "all of its axes are locked: limits, motors and springs need a free axis, as a hinge, slider, rope or generic joint has".into()
         };
         ensure(self.angular[0].bounds != NOWHERE, message)?;
         match &self.linear {

@@ -58,7 +58,6 @@ crate::saved::fields!(JointHandle { number, generation } scratch { tag });
 #[derive(Debug, Default)]
 pub struct Joints {
     all: Vec<Joint>,
-    /// The handle of each.
     handles: Vec<JointHandle>,
     /// Generation of each number, and the index of its joint or `None` if the number is free.
     numbers: Vec<(u32, Option<u32>)>,

@@ -57,7 +57,7 @@ impl MassProperties {
     pub const MOST_RATIO: f32 = 1e12;
 
     /// Largest ratio of m r² to a moment of inertia that a simulation accepts, where r is the lever of the shapes about
-    /// that axis. The ratio is 3 for boxes, 2.5 for balls and at most 20 for cones. From about 100 on, sweeps that
+    /// that axis. The ratio is 3 for boxes, 2.5 for balls and at most 15 for cones. From about 100 on, sweeps that
     /// solve one point at a time never bring a body to rest (docs/derivation.md, section 3).
     pub const MOST_LEVERAGE: f32 = 32.0;
 
@@ -66,7 +66,8 @@ impl MassProperties {
         Self { mass, center, ..Self::IMMOVABLE }
     }
 
-    /// Those of two things that are one body: the sum of the masses, their common center, and the inertia of both about it.
+    /// The mass properties of two parts of one body: the sum of their masses, their common center of mass, and the
+    /// inertia of both about it.
     ///
     /// ```
     /// use drystone::{MassProperties, glam::Vec3};
@@ -92,7 +93,7 @@ impl MassProperties {
         Self { mass: mass as f32, center: center.as_vec3(), principal_inertia, principal_frame }
     }
 
-    /// Refuses a mass that cannot be added to that of shapes.
+    /// Refuses a mass that cannot be added to the mass of shapes.
     pub(super) fn check_additional(&self) -> Result<()> {
         let Self { mass, principal_inertia, .. } = *self;
         let moments = principal_inertia.to_array();
@@ -124,7 +125,9 @@ impl MassProperties {
     pub(super) fn check_frame(&self) -> Result<()> {
         let Self { center, principal_frame, .. } = *self;
         let message = || {
-            format!("center of mass = {center}, principal frame = {principal_frame}: must be a place and a rotation")
+            format!(
+                "center of mass = {center}, principal frame = {principal_frame}: must be within 1e9 m and a unit quaternion"
+            )
         };
         ensure(is_place(center) && is_rotation(principal_frame), message)
     }

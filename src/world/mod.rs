@@ -126,7 +126,7 @@ impl World {
     }
 
     /// Adds a body to the last world and returns its index. [`World::insert`] returns its handle instead. If bodies are
-    /// removed, an index does not tell a body from the next body at the same index.
+    /// removed, an index does not distinguish a body from the next body at the same index.
     pub fn add(&mut self, body: Body) -> usize {
         self.insert(body).index()
     }
@@ -181,7 +181,7 @@ impl World {
     /// let [a, b] = [0.0, 2.0].map(|x| world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(x, 0.0, 0.0)));
     /// world.remove(a);
     /// let rope = world.insert_joint(Joint::new(b, Vec3::ZERO, a, Vec3::ZERO).rope(3.0));
-    /// assert_eq!(world.check().expect_err("a is gone").to_string(), "joint 0: names body 0, which is gone");
+    /// assert_eq!(world.check().expect_err("a is gone").to_string(), "joint 0: names body 0, which was removed");
     /// world.remove_joint(rope);
     /// assert!(world.check().is_ok());
     /// ```
@@ -285,7 +285,9 @@ impl World {
             let is_fixed = |body: usize| self.bodies[body].kind == BodyKind::Fixed;
             let ties_something = !is_fixed(a) || b.is_some_and(|b| !is_fixed(b));
             let other = || b.map_or_else(|| "the world".into(), |b| self.name_of(b));
-            ensure(ties_something, || format!("joint {i}: ties {} to {}, and both are fixed", self.name_of(a), other()))
+            ensure(ties_something, || {
+                format!("joint {i}: connects {} and {}, which are both fixed", self.name_of(a), other())
+            })
         })
     }
 
@@ -339,7 +341,7 @@ impl World {
             let exist = bodies.into_iter().flatten().try_for_each(|body| self.bodies.check_handle(body));
             exist.map_err(|e| e.within(format_args!("joint {i}")))?;
             let differ = joint.body_b != Some(joint.body_a);
-            ensure(differ, || format!("joint {i}: ties body {} to itself", joint.body_a.index()))?;
+            ensure(differ, || format!("joint {i}: connects body {} to itself", joint.body_a.index()))?;
             let breaks = joint.break_force;
             ensure(breaks > 0.0, || format!("joint {i}: break_force = {breaks}: must be above 0 N"))?;
             let are_places = is_place(joint.anchor_a) && is_place(joint.anchor_b);

@@ -82,7 +82,7 @@ impl Shape {
         // Check here: the hull code panics on a flat point cloud.
         let hull = spans_volume(points).then(|| SharedShape::convex_hull(points)).flatten();
         hull.map(|hull| Self(hull, Some(points.into())))
-            .ok_or_else(|| input!("a convex hull of {} points that spans no volume", points.len()))
+            .ok_or_else(|| input!("convex hull of {} points: the points must span a volume", points.len()))
     }
 
     /// All points p with p · `normal` <= 0; the normal points out of the solid and has unit length.
@@ -97,7 +97,7 @@ impl Shape {
     pub fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
         if let Some(t) = triangles.iter().find(|t| t.iter().any(|&i| i as usize >= vertices.len())) {
             let count = vertices.len();
-            return Err(input!("mesh triangle {t:?} names a vertex beyond the last, {count}"));
+            return Err(input!("mesh triangle {t:?} names a vertex beyond the last of {count}"));
         }
         if let Some((k, v)) = vertices.iter().enumerate().find(|(_, v)| !is_place(**v)) {
             return Err(input!("mesh vertex {k}, {v}: must be at most {MOST_LENGTH:e} m in size"));

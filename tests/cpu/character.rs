@@ -521,8 +521,8 @@ fn a_character_without_a_good_body_is_refused_in_one_line() {
     let ball = || Body::kinematic().shape(Shape::ball(0.5));
     let refused_body = |body: Body| refused(body, |_| {}, Vec3::X);
     assert!(refused_body(Body::dynamic().shape(Shape::ball(0.5))).contains("must be kinematic"));
-    assert!(refused_body(Body::kinematic()).contains("needs shapes"));
-    assert!(refused_body(Body::kinematic().sensor(Shape::ball(0.5))).contains("needs shapes"));
+    assert!(refused_body(Body::kinematic()).contains("must have shapes"));
+    assert!(refused_body(Body::kinematic().sensor(Shape::ball(0.5))).contains("must have shapes"));
     assert!(refused(ball(), |_| {}, f32::NAN * Vec3::X).contains("velocity = "));
     assert!(refused(ball(), |character| character.up = Vec3::ZERO, Vec3::X).contains("up = "));
     assert!(refused(ball(), |character| character.steepest = 2.0, Vec3::X).contains("steepest = 2"));
@@ -532,5 +532,5 @@ fn a_character_without_a_good_body_is_refused_in_one_line() {
     let mut walk = Walk::with(floor(), ball());
     walk.simulation.world.remove(walk.character.body);
     let error = walk.character.walk(&mut walk.simulation, Vec3::X, DT).expect_err("refused");
-    assert!(error.to_string().contains("gone"), "{error}");
+    assert!(error.to_string().contains("was removed"), "{error}");
 }

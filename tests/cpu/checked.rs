@@ -124,7 +124,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("params.axis_count: ", |p, _| p.params.axis_count += 1),
         ("joints[0].axis_count = 13", |p, _| p.joints[0].axis_count = 13),
         ("joints[0].first_axis = 0", |p, _| p.joints[0].axis_count = 1),
-        ("joints[1].first_axis = 0: axes of joints", |p, _| {
+        ("joints[1].first_axis = 0: overlaps the axes of joints", |p, _| {
             p.axes.push(AxisRow::default());
             p.joint_impulses.push(JointImpulseRow::default());
             p.params.axis_count = 1;
@@ -147,7 +147,7 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("contacts[0].point_count = 0", |p, _| p.contacts[0].point_count = 0),
         ("contacts[0].point_count = 5", |p, _| p.contacts[0].point_count = 5),
         ("contacts[0].first_point", |p, _| p.contacts[0].first_point = p.points.len() as u32),
-        ("contacts[2].first_point = 0: points of contacts[0] are there", |p, _| {
+        ("contacts[2].first_point = 0: overlaps the points of contacts[0]", |p, _| {
             p.contacts[2].first_point = 0;
             p.order = vec![0, 2];
             p.colors = vec![0, 2];
@@ -254,7 +254,7 @@ fn a_joint_color_with_a_body_twice_is_refused() {
     problem.colors.push(joints.end as u32);
     problem.in_one_block(contacts as u32, problem.blocks[0].substep);
     let line = refusal(problem, &plan.passes[..0]).expect("refused");
-    assert!(line.contains("occurs twice, and can move"), "{line}");
+    assert!(line.contains("can move, but occurs twice"), "{line}");
 }
 
 #[test]
@@ -277,7 +277,7 @@ fn passes_over_colors_that_are_not_there_are_refused() {
         let mut passes = plan.passes.clone();
         passes[pass].colors = colors.clone();
         let line = refusal(problem.clone(), &passes).unwrap_or_else(|| panic!("pass {pass}, {colors:?}: was taken"));
-        assert!(line.starts_with(&format!("pass {pass}, ")) && line.contains("there are"), "{line}");
+        assert!(line.starts_with(&format!("pass {pass}, ")) && line.contains("must be within"), "{line}");
     }
 }
 
@@ -301,11 +301,11 @@ fn sums_of_a_problem_without_room_for_them_are_refused() {
     let (mut problem, _) = step(&[]);
     let sums = Pass { kernel: Kernel::SumImpulses { first: false }, block: 0, colors: 0..1 };
     let line = refusal(problem.clone(), std::slice::from_ref(&sums)).expect("refused");
-    assert_eq!(line, "pass 0, sum_impulses: totals: there are none");
+    assert_eq!(line, "pass 0, sum_impulses: needs totals, but the problem has none");
     let of_joints = Kernel::SumJointImpulses { first: false };
     let of_joints = Pass { kernel: of_joints, block: 0, colors: problem.joint_colors() };
     let line = refusal(problem.clone(), std::slice::from_ref(&of_joints)).expect("refused");
-    assert_eq!(line, "pass 0, sum_joint_impulses: joint_totals: there are none");
+    assert_eq!(line, "pass 0, sum_joint_impulses: needs joint_totals, but the problem has none");
     problem.totals = problem.impulses.clone();
     problem.joint_totals = problem.joint_impulses.clone();
     assert_eq!(refusal(problem.clone(), &[sums, of_joints]), None);
@@ -322,9 +322,9 @@ fn momentum_over_several_blocks_is_refused_and_so_is_a_pass_of_no_block() {
     let mut beyond = momentum.clone();
     beyond.block = 1;
     let line = refusal(problem.clone(), &[beyond]).expect("refused");
-    assert!(line.starts_with("pass 0, extrapolate: block 1: there are 1"), "{line}");
+    assert!(line.starts_with("pass 0, extrapolate: block 1: must be less than 1"), "{line}");
     first_block_of_nothing(&mut problem);
     assert_eq!(refusal(problem.clone(), &[]), None);
     let line = refusal(problem, std::slice::from_ref(momentum)).expect("refused");
-    assert!(line.contains("there is more than one block"), "{line}");
+    assert!(line.contains("the problem must have one block"), "{line}");
 }

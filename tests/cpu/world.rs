@@ -107,21 +107,21 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("body 2 \"\": density = NaN kg/m³: must be a number above 0", |w| {
             w.add(cube().density(f32::NAN).named(""));
         }),
-        ("body 2 \"\": mass = -1e0 kg, by total_mass: must be", |w| {
+        ("body 2 \"\": total_mass = -1e0 kg: must be", |w| {
             w.add(cube().total_mass(-1.0).named(""));
         }),
         ("body 0 \"\": mass = ", |w| {
             w.bodies[0] = Body::fixed().shape(Shape::ball(1.0));
             w.bodies[0].kind = BodyKind::Dynamic;
         }),
-        ("joint 0: ties", |w| {
+        ("joint 0: connects", |w| {
             w.join(Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO));
         }),
-        ("joint 0: ties body 2 \"post\" to the world, and both are fixed", |w| {
+        ("joint 0: connects body 2 \"post\" and the world, which are both fixed", |w| {
             let post = w.add(Body::fixed().named("post"));
             w.join(Joint::to_world(post, Vec3::ZERO, Vec3::ZERO));
         }),
-        ("joint 0: ties body 2 \"post\" to body 3 \"beam\", and both are fixed", |w| {
+        ("joint 0: connects body 2 \"post\" and body 3 \"beam\", which are both fixed", |w| {
             let [post, beam] = ["post", "beam"].map(|name| w.add(Body::fixed().named(name)));
             w.join(Joint::new(post, Vec3::ZERO, beam, Vec3::ZERO).hinge(Vec3::Z));
         }),
@@ -202,7 +202,7 @@ fn a_joint_to_a_body_that_is_gone_is_refused_and_does_not_tie_a_stranger() {
             w.beside(&other);
         })
     };
-    let told = "joint 0: names body 2, which is gone: \"stranger\" has its index";
+    let told = "joint 0: names body 2, which was removed: \"stranger\" has its index";
     for joint in [(|b, a| Joint::new(b, Vec3::ZERO, a, Vec3::ZERO)) as fn(BodyHandle, BodyHandle) -> Joint, |b, a| {
         Joint::new(b, Vec3::ZERO, a.index(), Vec3::ZERO)
     }] {

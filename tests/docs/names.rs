@@ -12,7 +12,7 @@ fn a_name_is_read_back_and_another_is_refused_with_the_list() {
     assert!(Stabilization::ALL.into_iter().all(|value| value.name().parse::<Stabilization>().ok() == Some(value)));
     assert_eq!(format!("{:>9}", Order::Contacts), " contacts");
     let message = "gauss".parse::<Method>().expect_err("no method").to_string();
-    assert_eq!(message, "\"gauss\" is none of plain, accelerated");
+    assert_eq!(message, "\"gauss\": must be one of plain, accelerated");
     assert_eq!("auto".parse::<BackendChoice>().expect("a choice"), BackendChoice::Auto);
 }
 

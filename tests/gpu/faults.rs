@@ -203,7 +203,7 @@ fn memory_that_is_not_there_is_refused_in_one_line() {
     let gpu = open(GpuOptions { memory: 10_000, ..GpuOptions::default() });
     let mut simulation = Simulation::with(scene.world.clone(), SolverConfig::default(), gpu).expect("good settings");
     let Err(Error::TooLarge(line)) = simulation.step(scene.dt) else { panic!("there was memory") };
-    assert_one_line(&line, &[" B of memory for the ", "use --backend cpu"]);
+    assert_one_line(&line, &["cannot allocate ", " B for the ", "use --backend cpu"]);
     simulation.set_backend(Box::new(Cpu::new()));
     simulation.step(scene.dt).expect("the processor has memory");
 }

@@ -207,5 +207,5 @@ fn a_contact_problem_of_locked_bodies_is_refused_by_name() {
         .map(|_| ())
         .expect_err("a lock")
         .to_string();
-    assert_eq!(error, "body 0 \"crate\" has locked rotations: a body of a contact problem turns freely");
+    assert_eq!(error, "body 0 \"crate\" has locked rotations: a contact problem cannot have locked rotations");
 }

@@ -269,7 +269,7 @@ fn rows_that_are_not_there_are_refused() {
     let confused = Box::new(Confused(gpu::exact(), spoil));
     let mut simulation = simulation(&scene, &SolverConfig::default().without_sleep(), confused);
     let line = (0..80).find_map(|_| simulation.step(scene.dt).err()).expect("the row is refused");
-    assert!(line.to_string().starts_with("contacts written again: a row that is not there"), "{line}");
+    assert!(line.to_string().starts_with("contacts written again: a row does not exist"), "{line}");
 }
 
 /// What each of the last steps of a scene moved to the device and back, and the simulation.

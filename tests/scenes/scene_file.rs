@@ -178,9 +178,9 @@ fn a_number_beyond_double_precision_is_refused_where_it_stands() {
 
 #[test]
 fn another_version_is_refused_first() {
-    assert_eq!(refusal(r#"{"version": 2, "bodies": []}"#), "version = 2: only version 1 is known");
-    assert_eq!(refusal(r#"{"version": 2, "worlds": []}"#), "version = 2: only version 1 is known");
-    assert_eq!(refusal(r#"{"version": "1.0"}"#), "version = \"1.0\": only version 1 is known");
+    assert_eq!(refusal(r#"{"version": 2, "bodies": []}"#), "version = 2: only version 1 is supported");
+    assert_eq!(refusal(r#"{"version": 2, "worlds": []}"#), "version = 2: only version 1 is supported");
+    assert_eq!(refusal(r#"{"version": "1.0"}"#), "version = \"1.0\": only version 1 is supported");
     assert!(refusal(r#"{"bodies": []}"#).starts_with("missing field `version`"));
 }
 
@@ -285,10 +285,10 @@ fn impossible_shapes_are_refused() {
             json!({"type": "cuboid", "half_extents": [0.5, -1, 0.5]}),
             "cuboid of half extent -1: must be more than 0 and at most 1e9 m",
         ),
-        (json!({"type": "convex_hull", "points": []}), "a convex hull of 0 points that spans no volume"),
+        (json!({"type": "convex_hull", "points": []}), "convex hull of 0 points: the points must span a volume"),
         (
             json!({"type": "convex_hull", "points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]}),
-            "a convex hull of 4 points that spans no volume",
+            "convex hull of 4 points: the points must span a volume",
         ),
         (
             json!({"type": "convex_hull", "points": [[0, 0, 0], [1, 0, 1e39]]}),
@@ -300,7 +300,7 @@ fn impossible_shapes_are_refused() {
         ),
         (
             json!({"type": "mesh", "vertices": [[0, 0, 0], [1, 0, 0]], "triangles": [[0, 1, 2]]}),
-            "mesh triangle [0, 1, 2] names a vertex beyond the last, 2",
+            "mesh triangle [0, 1, 2] names a vertex beyond the last of 2",
         ),
         (
             json!({"type": "height_field", "heights": [[0, 0], [0, 1e9]], "scale": [1, 2, 1]}),

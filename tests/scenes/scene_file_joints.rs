@@ -56,12 +56,12 @@ fn a_joint_that_ties_nothing_is_refused_in_one_line() {
     for (bodies, line) in [
         (json!(["b", 1]), "body \"b\": no body has that name"),
         (json!([1, "twin"]), "body \"twin\": bodies 2 and 3 have that name; give an index"),
-        (json!([1, 4]), "body 4: there are 4, counted from 0"),
+        (json!([1, 4]), "body 4: must be less than 4, the number of bodies"),
         (json!([1, "a"]), "bodies 1 and \"a\": the same body twice"),
         (json!(["wall", 3]), "no body of the joint can move: at least one must be dynamic"),
         (json!([3]), "no body of the joint can move: at least one must be dynamic"),
-        (json!([]), "0 bodies: a joint ties one or two"),
-        (json!([0, 1, 2]), "3 bodies: a joint ties one or two"),
+        (json!([]), "0 bodies: a joint connects one or two"),
+        (json!([0, 1, 2]), "3 bodies: a joint connects one or two"),
     ] {
         assert_eq!(refusal(json!({"type": "ball", "bodies": bodies, "anchor": [0, 0, 0]})), line);
     }

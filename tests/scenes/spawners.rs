@@ -203,7 +203,7 @@ fn what_a_scene_file_cannot_say_is_refused_in_one_line() {
     let mut scene = Scene::find("tower", &[]).expect("a scene");
     let refusal = |scene: &Scene| SceneFile::of(scene).expect_err("a refusal").to_string();
     scene.world.beside(&World::new());
-    assert_eq!(refusal(&scene), "a scene file holds one world, and there are 2 beside each other");
+    assert_eq!(refusal(&scene), "a scene file has room for one world, but this scene has 2");
     let mut scene = Scene::find("tower", &[]).expect("a scene");
     scene.world.bodies[2].position.y = f32::NAN;
     let line = refusal(&scene);

@@ -9,7 +9,7 @@ use drystone::{BodyHandle, BodyKind, World};
 const MARGIN: f32 = 0.25;
 /// Distance in radii of a scene beyond which a body that left the others counts as gone.
 pub(crate) const FAR: f32 = 4.0;
-/// At most one in this many bodies can be gone.
+/// At most one in this many bodies can count as gone.
 const GONE: usize = 10;
 
 /// An axis-aligned box: lower and upper corner (m).
@@ -55,7 +55,7 @@ impl Bounds {
         Self::at(world, &poses(world), f32::INFINITY)
     }
 
-    /// The same with the bodies at `poses`, without the few bodies that flew away from a scene of this radius (m).
+    /// The same with the bodies at `poses`, without a few bodies that flew away from a scene of this radius (m).
     pub fn at(world: &World, poses: &Poses, radius: f32) -> Self {
         Self::with_margin(world, poses, MARGIN, radius)
     }
@@ -133,7 +133,7 @@ mod tests {
     fn one_of_many_that_flew_off_is_left_out_with_its_joints() {
         let radius = Bounds::of(&row(20, 0.0)).radius();
         assert!(length(&row(20, 1e4), radius) < 20.0);
-        // Not as far as four radii, and one of few.
+        // A body stays in the bounds if it is nearer than four radii, or if there are few bodies.
         assert!(length(&row(20, 25.0), radius) > 40.0);
         assert!(length(&row(9, 1e4), radius) > 1e4);
         assert!(length(&row(20, 1e4), f32::INFINITY) > 1e4);

@@ -19,7 +19,7 @@ pub enum ColorBy {
     Impulse,
     /// Sleeping bodies are dark, awake bodies light.
     Sleeping,
-    /// Substeps that the island of the body takes, dark to light: doubled with each shade.
+    /// Substeps of the body's island, dark to light: each shade doubles them.
     Effort,
 }
 
@@ -55,7 +55,7 @@ impl FromStr for ColorBy {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        let unknown = || Error::input(format!("{name:?} is none of {}", Self::ALL.map(Self::name).join(", ")));
+        let unknown = || Error::input(format!("{name:?}: must be one of {}", Self::ALL.map(Self::name).join(", ")));
         Self::ALL.into_iter().find(|color| color.name() == name).ok_or_else(unknown)
     }
 }
@@ -220,7 +220,7 @@ mod tests {
     fn a_quantity_is_found_by_its_name_and_all_follow_each_other() {
         assert!(ColorBy::ALL.into_iter().all(|color| color.name().parse::<ColorBy>().ok() == Some(color)));
         let message = "mass".parse::<ColorBy>().expect_err("no color").to_string();
-        assert_eq!(message, "\"mass\" is none of material, batch, speed, impulse, sleeping, effort");
+        assert_eq!(message, "\"mass\": must be one of material, batch, speed, impulse, sleeping, effort");
         let next = ColorBy::ALL.map(ColorBy::next);
         assert!(next[..5] == ColorBy::ALL[1..] && next[5] == ColorBy::ALL[0]);
     }

@@ -459,7 +459,7 @@ mod tests {
         assert!(live.world().joints.is_empty() && live.world().bodies[top].position.y < before.y + 0.5, "it falls");
     }
 
-    /// The number of joints stays the same while the joint changes.
+    /// The number of joints stays the same when another joint takes the place of the first.
     #[test]
     fn another_body_can_be_grabbed_right_after_one_was_released() {
         let mut live = live("tower");

@@ -25,7 +25,7 @@ impl AdaptersArgs {
             return print_json(&json!({"adapters": found.iter().map(adapter).collect::<Vec<_>>()}));
         }
         if found.is_empty() {
-            return print("none; everything runs on the CPU");
+            return print("no adapters; everything runs on the CPU");
         }
         let mut table = plain_table();
         table.set_header(["name", "api", "kind", "driver", "exact mode", "largest buffer"]);

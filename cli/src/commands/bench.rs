@@ -19,7 +19,7 @@ use crate::settings;
 use drystone::backend::{BackendChoice, choose};
 use drystone::{Backend, Error, Result};
 
-/// Measure the times of the stages of a step, and errors: for scenes at rest, or as one of the flags says.
+/// Measure the stage times and errors of scenes at rest, or the quantities that a flag selects.
 #[derive(Args)]
 pub struct BenchArgs {
     /// Scenes, as name:key=value,worlds=N; by default the standard scenes of the measurement.
@@ -38,11 +38,10 @@ pub struct BenchArgs {
     /// Count the steps per second of one world, in 1 to 4096 worlds; with --quick up to 256.
     #[arg(long, group = "subject")]
     worlds: bool,
-    /// Time keeping a state, going back, saving and loading, compared with a step, and count bytes per body.
+    /// Measure the times to keep, restore, save and load a state, compared with a step, and the bytes per body.
     #[arg(long, group = "subject")]
     states: bool,
-    /// Compare sweeps with the limits of memory and arithmetic: counted bytes and operations, compared with a triad and
-    /// the peak.
+    /// Compare the bytes and operations of sweeps with the limits of memory (a triad) and of arithmetic (the peak).
     #[arg(long, group = "subject")]
     limits: bool,
     /// Number of steps of falling scenes.

@@ -38,7 +38,7 @@ pub struct ConformArgs {
     /// Run only checks whose name contains one of these texts.
     #[arg(long, value_name = "TEXT", value_delimiter = ',', num_args = 1..)]
     name: Vec<String>,
-    /// Make the arithmetic of kernels wrong by one percent, to see that the checks find it.
+    /// Change kernel arithmetic by one percent, to show that the checks detect it.
     #[arg(long)]
     perturb: bool,
     /// Check fewer variants of kernels and fewer steps of scenes.

@@ -23,7 +23,7 @@ pub struct ReportArgs {
 
 #[derive(Subcommand)]
 enum Page {
-    /// Show the effects of each rule, from the course sheet.
+    /// Measure the effect of each solver rule.
     Rules {
         /// Directory for the page and its pictures.
         #[arg(long, default_value = "docs")]

@@ -164,10 +164,10 @@ impl RunArgs {
         match &report.first_non_finite {
             Some(body) => {
                 let kept = match &self.record {
-                    Some(file) => format!("`drystone replay {}` runs it again", file.display()),
+                    Some(file) => format!("`drystone replay {}` repeats the run", file.display()),
                     None => "the same command with --record FILE keeps the run, for a report".into(),
                 };
-                Err(Error::input(format!("body {body} left the finite range: its numbers are not to be used; {kept}")))
+                Err(Error::input(format!("body {body} left the finite range: do not use its results; {kept}")))
             }
             None => Ok(()),
         }

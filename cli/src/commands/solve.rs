@@ -71,10 +71,10 @@ impl SolveArgs {
                 let bodies = || format!("{}: fclib_local: has no bodies", self.file.display());
                 if self.backend != BackendKind::F64 {
                     let name = self.backend;
-                    return Err(Error::input(format!("{}: --backend f64 sweeps it, and {name} does not", bodies())));
+                    return Err(Error::input(format!("{}: use --backend f64, not {name}", bodies())));
                 }
                 if self.order == Some(Order::Manifolds) || self.passes.is_some_and(|passes| passes > 1) {
-                    return Err(Error::input(format!("{}: it is swept by contacts, once each", bodies())));
+                    return Err(Error::input(format!("{}: use --order contacts with one pass", bodies())));
                 }
                 SolveReport::of_blocks(problem, &self.settings(method, Order::Contacts))
             }
@@ -110,7 +110,7 @@ impl SolveArgs {
             ("--exact", self.exact),
         ];
         if let Some((name, _)) = given.into_iter().find(|given| given.1) {
-            return Err(Error::input(format!("{name}: --method newton has none")));
+            return Err(Error::input(format!("{name}: not available with --method newton")));
         }
         if self.backend != BackendKind::F64 {
             return Err(Error::input(format!("--backend {}: --method newton runs in f64", self.backend)));
@@ -133,7 +133,7 @@ impl SolveArgs {
 fn ended(r: &NewtonReport) -> String {
     let newton = match r.newton {
         NewtonEnded::NotBegun => "Newton's method was not needed",
-        NewtonEnded::Reached => "Newton's method reached it",
+        NewtonEnded::Reached => "Newton's method reached the tolerance",
         NewtonEnded::Stalled => "the error of Newton's method no longer fell",
         NewtonEnded::Blocked => "Newton's method found no further step",
         _ => "Newton's method ended",

@@ -1,4 +1,4 @@
-//! Enums of the library as argument values: their names, and one line of help for each.
+//! Enums of the library as argument values, each with its name and one line of help.
 
 use std::str::FromStr;
 
@@ -48,7 +48,7 @@ impl Named for Family {
 #[cfg(feature = "gpu")]
 impl Named for Group {
     const WORDS: &'static [(&'static str, &'static str)] = &[
-        ("kernels", "Every kernel on random problems, compared with its twin in Rust"),
+        ("kernels", "Every kernel on random problems, compared with the reference"),
         ("scenes", "Every scene of the catalogue, small and short, compared with the reference"),
         ("limits", "Large buffers, and problems beyond the limits of buffers and memory"),
         ("long-dispatch", "Plans that would hold the device for a long time"),
@@ -125,7 +125,7 @@ impl Named for ColorBy {
         ("speed", "Speed of the center of mass, dark to light"),
         ("impulse", "Sum of the normal impulses on the body in the last substep, dark to light"),
         ("sleeping", "Sleeping bodies are dark, awake bodies light"),
-        ("effort", "Substeps that the island of the body takes, dark to light: doubled with each shade"),
+        ("effort", "Substeps of the body's island, dark to light: each shade doubles them"),
     ];
 }
 

@@ -15,7 +15,7 @@ pub(super) fn overlaps(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let mut simulation = setup.simulation(world)?;
         let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
         let (percent, limit) = (100.0 * share, f64::from(setup.config.push_limit));
-        checks.at_most(format!("{percent:.0} %: speed at any time over the push limit"), speed / limit, 1.0);
+        checks.at_most(format!("{percent:.0} %: largest speed over the push limit"), speed / limit, 1.0);
         let depth = 1e3 * simulation.penetration().max;
         checks.at_most(format!("{percent:.0} %: overlap after 5 s [mm]"), depth, 1.0);
     }
@@ -34,7 +34,7 @@ pub(super) fn no_direction(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let most = f64::from(world.bodies.iter().map(|b| b.mass.mass).sum::<f32>()) * 0.5 * limit * limit;
         let mut simulation = setup.simulation(world)?;
         let gained = largest(LEAST, watch(&mut simulation, 300, energy)?) - before;
-        checks.at_most(format!("{what}: energy gained over what the push limit allows"), gained / most, 1.0);
+        checks.at_most(format!("{what}: energy gained over the energy at the push limit"), gained / most, 1.0);
         checks.finite(&format!("{what}: "), &simulation.world);
         Ok(())
     };
@@ -52,7 +52,7 @@ pub(super) fn held(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for depth in [0.05, 0.1] {
         let mut simulation = setup.sleeping(Scene::find_spec(&format!("press:depth={depth}"))?.world)?;
         let fastest = largest(LEAST, watch(&mut simulation, 600, |world| metrics::fastest(world).0)?);
-        checks.at_most(format!("{depth} m deep: speed at any time [m/s]"), fastest, 0.5);
+        checks.at_most(format!("{depth} m deep: largest speed [m/s]"), fastest, 0.5);
         let crate_ = simulation.world.bodies.iter().position(|body| body.name == "crate").expect("a crate");
         let substeps = simulation.substeps_of(crate_) / setup.config.substeps;
         checks.at_most(format!("{depth} m deep: substeps, over those of the settings"), substeps.into(), 1.0);
@@ -120,8 +120,8 @@ pub(super) fn no_inertia(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).0)?);
     let moved = still.iter().map(|&i| before.bodies[i].position.distance(simulation.world.bodies[i].position).into());
     checks.finite("", &simulation.world);
-    checks.at_most("way of what lies still [mm]", 1e3 * largest(LEAST, moved), 1.0);
-    checks.at_most("speed at any time [m/s]", speed, 0.1);
+    checks.at_most("displacement of bodies at rest [mm]", 1e3 * largest(LEAST, moved), 1.0);
+    checks.at_most("largest speed [m/s]", speed, 0.1);
     Ok(())
 }
 
@@ -143,7 +143,7 @@ pub(super) fn painleve(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let grown = all.windows(2).map(|pair| pair[1] - pair[0]);
         let to = if way > 0.0 { "its middle" } else { "the outside" };
         let what = format!("mu {mu}, {degrees} degrees, tip to {to}");
-        checks.at_most(format!("{what}: most energy gained in a step, relative"), largest(LEAST, grown) / before, 1e-3);
+        checks.at_most(format!("{what}: relative energy gain in a step"), largest(LEAST, grown) / before, 1e-3);
         checks.finite(&format!("{what}: "), &simulation.world);
     }
     Ok(())

@@ -20,7 +20,7 @@ pub struct Judged {
     pub checks: Vec<Check>,
     /// Processor time of the median step, divided by the number of movable bodies (ms).
     pub ms: f64,
-    /// Processor time of all steps over the time of the world (s a second).
+    /// Processor time of all steps divided by the simulated time (s/s).
     pub seconds: f64,
 }
 
@@ -157,10 +157,10 @@ pub fn judge(scene: &Scene, law: &Law, setup: &Setup) -> Result<Judged> {
     judge_while(scene, law, setup, |_, _| Ok(()))
 }
 
-/// The same, with a look at each step, whose time does not count.
+/// The same, but calls `look` after each step. The time of these calls does not count.
 ///
 /// # Errors
-/// The scene cannot be run, or `look` ends the run.
+/// The scene cannot be run, or `look` returns an error, which ends the run.
 pub fn judge_while(
     scene: &Scene,
     law: &Law,
@@ -186,7 +186,7 @@ pub fn judge_while(
             checks.at_most("bodies out of place", fallen as f64, 0.0);
             checks.at_most("fastest body at the end, over a fall by the size of one", speed(end), AT_REST);
         }
-        Law::Sticks => checks.at_most("way of the block [mm]", 1e3 * way(start, end), 1e3 * CREEP),
+        Law::Sticks => checks.at_most("displacement of the block [mm]", 1e3 * way(start, end), 1e3 * CREEP),
         Law::Slides(acceleration) => {
             let time = f64::from(scene.steps) * f64::from(scene.dt);
             let exact = *acceleration * time;
@@ -201,14 +201,14 @@ pub fn judge_while(
         }
         Law::Swings { link, energy } => {
             checks.at_most("largest gap of a joint over the length of a link", watch.gap / link, GAP);
-            checks.at_most("energy gained over what the swing sets free", watch.gained / energy, GAIN);
+            checks.at_most("energy gained over the potential energy of the swing", watch.gained / energy, GAIN);
         }
         Law::Settles => {
             checks.at_most("bodies outside", scene.escaped(end) as f64, 0.0);
             // Without a fall there is no released energy to compare with, and the check fails.
             let freed = (energy(start) - end.potential_energy()).max(0.0);
             checks.at_most(
-                "kinetic energy at the end over what the fall set free",
+                "kinetic energy at the end over the energy of the fall",
                 end.kinetic_energy() / freed,
                 SETTLED,
             );
@@ -369,7 +369,8 @@ mod tests {
         assert!(!passes(&judged(&scene, &law)), "the floor is gone");
     }
 
-    /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+    /// Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I: 81 of 263, 15 of 148, 0 of
+    /// 20, 1 of 29.
     #[test]
     fn intervals_are_those_of_the_literature() {
         for (passed, count, [least, most]) in [

@@ -16,7 +16,7 @@ pub(super) fn far_and_bad(setup: &Setup, checks: &mut Checks) -> Result<()> {
         };
         let worst = at_origin.bodies.iter().zip(&far.bodies).map(off);
         // The limit is twice the spacing of floats at that distance.
-        let what = format!("{km} km from the origin: a tower of 5, off the one at the origin [mm]");
+        let what = format!("{km} km from the origin: difference from a tower of 5 at the origin [mm]");
         checks.at_most(what, 1e3 * largest(0.0, worst), most.into());
         checks.finite(&format!("{km} km from the origin: "), &far);
     }
@@ -28,13 +28,13 @@ pub(super) fn far_and_bad(setup: &Setup, checks: &mut Checks) -> Result<()> {
         setup.simulation(world).map_or_else(|e| !e.to_string().contains("culprit"), |_| true)
     };
     let taken = bad.iter().filter(is_taken).count();
-    checks.at_most(format!("of {} bodies that are no input: taken", bad.len()), taken as f64, 0.0);
+    checks.at_most(format!("invalid bodies accepted, of {}", bad.len()), taken as f64, 0.0);
     let mut world = floor(0.5);
     let tiny = f32::MIN_POSITIVE / 8.0;
     world.add(cube(0.0, 0.5).velocity(Vec3::splat(tiny), Vec3::splat(tiny)).position(tiny, 0.5, tiny));
     let mut simulation = setup.simulation(world)?;
     (0..60).try_for_each(|_| simulation.step(DT).map(drop))?;
-    checks.finite("numbers next to zero: ", &simulation.world);
+    checks.finite("subnormal numbers: ", &simulation.world);
     Ok(())
 }
 

@@ -39,7 +39,7 @@ pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
         gained = largest(gained, [energy(&simulation.world) - before]);
     }
     checks.at_most("largest gap of a joint over the length of a link", gap / 0.5, 0.01);
-    checks.at_most("energy gained over what the swing sets free", gained / scale, 1e-3);
+    checks.at_most("energy gained over the potential energy of the swing", gained / scale, 1e-3);
     checks.finite("", &simulation.world);
     Ok(())
 }
@@ -170,7 +170,7 @@ pub(super) fn rolling(setup: &Setup, checks: &mut Checks) -> Result<()> {
     checks.at_most("disc, 90 degrees: mean squared error [m²/s²]", error(90.0, Friction::Disc)?, 1e-5);
     checks.at_most("box, 90 degrees: mean squared error [m²/s²]", error(90.0, Friction::Box)?, 1e-5);
     // The plate does not move: the friction limit of each direction alone exceeds the push.
-    checks.at_most("box, 60 degrees: off the error of a plate that stays, 3.145 m²/s²", (across - 3.145).abs(), 0.005);
+    checks.at_most("box, 60 degrees: deviation from a fixed plate's 3.145 m²/s²", (across - 3.145).abs(), 0.005);
     Ok(())
 }
 
@@ -185,7 +185,7 @@ pub(super) fn release(setup: &Setup, checks: &mut Checks) -> Result<()> {
     (0..120).try_for_each(|_| simulation.step(DT).map(drop))?;
     simulation.world.bodies[top].position = Vec3::new(50.0, 0.5, 0.0);
     let highest = largest(LEAST, watch(&mut simulation, 120, |w| w.bodies[second].position.y.into())?);
-    checks.at_most("rise of the ball under the load above its place [mm]", 1e3 * (highest - 1.5), 5.0);
+    checks.at_most("rise of the ball under the load [mm]", 1e3 * (highest - 1.5), 5.0);
     Ok(())
 }
 

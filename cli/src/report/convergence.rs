@@ -1,4 +1,5 @@
-//! `drystone report convergence`: sweeps that contact problems need to reach an error, plain and accelerated.
+//! `drystone report convergence`: the numbers of plain and accelerated sweeps that contact problems need to reach an
+//! error.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,7 +13,7 @@ use drystone_scenes::Scene;
 use super::run::RunReport;
 use super::solve::{SolveReport, SolveSettings};
 
-/// Catalogue scenes, each with the step that is solved.
+/// Catalogue scenes, each with the step to solve.
 const STEPS: [(&str, u32); 5] =
     [("tower:n=10", 30), ("wall:rows=8,columns=8", 60), ("pyramid", 30), ("pile:n=200", 90), ("pile:n=200", 300)];
 
@@ -26,11 +27,11 @@ const MOST: u32 = 40_000;
 const RUNS: [(&str, u32); 4] =
     [("tower:n=20,offset=0.01", 300), ("wall", 120), ("mass-ratio:ratio=1000", 300), ("pile:n=1000", 180)];
 
-/// Substeps, and biased and relax sweeps per substep: 16 or 64 in all.
+/// Substeps, and biased (and relax) sweeps per substep: 16 or 64 sweeps in total.
 const SETTINGS: [(u32, u32); 7] = [(8, 1), (4, 2), (2, 4), (1, 8), (32, 1), (4, 8), (2, 16)];
 
-/// Makes the page from steps of catalogue scenes and the `.contacts` files of `folder`. `after_problem` is called after each problem
-/// with the number of problems.
+/// Makes the page from steps of catalogue scenes and the `.contacts` files of `folder`. Calls `after_problem` after
+/// each problem with the number of problems.
 pub fn convergence(folder: Option<&Path>, mut after_problem: impl FnMut(usize)) -> Result<String> {
     let problems = problems(folder)?;
     let mut page = include_str!("convergence_head.md").to_owned();
@@ -82,7 +83,7 @@ fn runs(page: &mut String) -> Result<()> {
         let scene = Scene::find_spec(spec)?;
         let mut title = spec.replace([':', ','], " ");
         for (substeps, sweeps) in SETTINGS {
-            // Momentum begins with the third sweep.
+            // Momentum starts with the third sweep.
             let methods = if sweeps < 3 { &[Method::Plain][..] } else { &[Method::Plain, Method::Accelerated] };
             for &method in methods {
                 let config = SolverConfig::default().without_sleep().with(|c| {
@@ -114,14 +115,14 @@ fn kind_name((method, passes): (Method, u8)) -> String {
     format!("{method:?}, {passes} pass{}", if passes == 1 { "" } else { "es" }).to_lowercase()
 }
 
-/// The contact problem of a step of a scene at default settings without sleep; step 1 is the first.
+/// The contact problem of a step of a scene, with default settings and without sleep. Step 1 is the first.
 pub fn problem_of_step(scene: Scene, step: u32) -> Result<ContactProblem> {
     let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))?;
     (1..step).try_for_each(|_| simulation.step(scene.dt).map(drop))?;
     Ok(drystone_problems::step_with_contacts(&mut simulation, &format!("{}, step {step}", scene.name), scene.dt)?.0)
 }
 
-/// Contact problems: steps of catalogue scenes, then the `.contacts` files of a folder by their names.
+/// Contact problems: steps of catalogue scenes, then the `.contacts` files of a folder, sorted by name.
 pub fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
     let mut problems = Vec::new();
     for (spec, step) in STEPS {
@@ -141,13 +142,13 @@ pub fn problems(folder: Option<&Path>) -> Result<Vec<ContactProblem>> {
 mod tests {
     use super::*;
 
-    /// The cells of the rows of the page that begin with this text.
+    /// The cells of the page's rows that begin with this text.
     fn cells(page: &str, begins: &str) -> Vec<Vec<String>> {
         let lines = page.lines().filter(|l| l.starts_with(begins));
         lines.map(|l| l.split('|').map(|cell| cell.trim().to_owned()).collect()).collect()
     }
 
-    /// With one problem, medians are its own values.
+    /// With one problem, medians are the values of that problem.
     #[test]
     fn gains_are_plain_over_own() {
         let problem = problem_of_step(Scene::find_spec("tower:n=4").expect("the scene"), 1).expect("a problem");

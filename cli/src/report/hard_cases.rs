@@ -64,9 +64,9 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
         COLUMNS.iter().map(|&(preset, numbers)| format!("{preset} ({}), {numbers}", substeps(preset))).collect();
     Ok(format!(
         "# Hard cases\n\n\
-         `drystone hard --page docs` makes this page. `drystone hard --case H3 --preset accurate` runs one case, `drystone hard\n\
-         --list` describes all. Failures are in bold. The columns are presets with their substeps, on the CPU lanes in single\n\
-         precision (`cpu`), on the reference in double precision (`f64`), and in the shaders (`gpu`). The adapter is\n\
+         `drystone hard --page docs` makes this page. `drystone hard --case H3 --preset accurate` runs one case, and\n\
+         `drystone hard --list` describes all. The columns are presets with their substeps on the CPU lanes in single precision\n\
+         (`cpu`), the reference in double precision (`f64`) and the shaders (`gpu`). Failures are in bold. The adapter is\n\
          {gpu}.\n\n\
          | case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{}",
         heads.join(" | "),

@@ -1,4 +1,4 @@
-//! The page of families: shares that pass, times, and seeds that fail, for each preset.
+//! The page of families: passing shares, times, and failing seeds for each preset.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ use drystone_scenes::Family;
 
 const PRESETS: [Preset; 3] = [Preset::Fast, Preset::Balanced, Preset::Accurate];
 
-/// The page as Markdown. `judge` gives the shares of the families at a preset.
+/// The page as Markdown. `judge` returns the shares of the families at a preset.
 ///
 /// # Errors
 /// A world cannot be run.
@@ -54,7 +54,7 @@ fn cell(share: &FamilyShare) -> String {
     format!("{:.0} % ({least:.1} to {most:.1}), {:.2} µs", 100.0 * share.share(), 1e3 * share.ms())
 }
 
-/// The statics or the closed form of a family, and the criterion.
+/// The text on the statics or closed form of a family, and on the criterion.
 const fn text(family: Family) -> &'static str {
     match family {
         Family::Stacks => include_str!("hard_families/stacks.md"),
@@ -67,7 +67,7 @@ const fn text(family: Family) -> &'static str {
         Family::Slopes => include_str!("hard_families/slopes.md"),
         Family::PushedBlocks => include_str!("hard_families/pushed-blocks.md"),
         Family::Piles => include_str!("hard_families/piles.md"),
-        // The library may gain families before the page has their texts.
+        // The library can have families for which the page has no text yet.
         _ => "",
     }
 }

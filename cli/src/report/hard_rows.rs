@@ -1,4 +1,4 @@
-//! Hard cases as rows, so that several machines may run them and a stopped run goes on.
+//! Hard cases as rows, so that several machines can run them and a stopped run can continue.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ pub struct HardRow {
     pub threads: usize,
     pub what: String,
     pub value: f64,
-    /// Whether the limit is the least value that passes, in place of the largest.
+    /// Whether the limit is the smallest value that passes; otherwise it is the largest.
     pub at_least: bool,
     pub limit: f64,
     pub passed: bool,
@@ -73,25 +73,25 @@ impl HardRow {
     }
 }
 
-/// The checks of cases with one setup, some of which are in rows already.
+/// The checks of cases with one setup. Some of them can already have rows.
 pub struct HardRows {
-    /// The file that gets the rows of each case when it is run.
+    /// The file that gets the rows of each case after its run.
     out: Option<PathBuf>,
     rows: Vec<HardRow>,
-    /// What rows of this setup have in their hashes beside the case.
+    /// The part of the hashes that is the same for all cases of this setup.
     setup: String,
     origin: Origin,
 }
 
 impl HardRows {
-    /// The rows of a file, which a missing file has not, for a backend by its name.
+    /// The rows of a file for a backend name; empty if the file is missing.
     ///
     /// # Errors
     /// The file cannot be read.
     pub fn open(out: Option<&Path>, setup: &Setup, backend: &str) -> Result<Self> {
         let rows = out.filter(|path| path.is_file()).map_or(Ok(Vec::new()), files::rows)?;
         let config = serde_json::to_string(&setup.config).expect("settings serialize");
-        // The program file is read only where rows name it.
+        // Only rows that go to a file need the hash of the program file.
         let origin = out.map_or_else(Origin::default, |_| Origin::here(None));
         Ok(Self { out: out.map(Path::to_owned), rows, setup: format!("{config} {backend}"), origin })
     }
@@ -100,10 +100,10 @@ impl HardRows {
         super::comparison::fnv(format!("{} {} {}", case.name, case.summary, self.setup).as_bytes())
     }
 
-    /// The checks of a case, from rows that the same program measured on this machine, or else by running it.
+    /// The checks of a case, from rows that the same program measured on this machine, or from a run.
     ///
     /// # Errors
-    /// The case cannot be run, or its rows not be written.
+    /// The case cannot run, or its rows cannot be written.
     pub fn run(&mut self, case: &Case, setup: &Setup) -> Result<Vec<Check>> {
         let hash = self.hash(case);
         let Origin { build, machine, .. } = &self.origin;
@@ -124,10 +124,10 @@ impl HardRows {
         Ok(())
     }
 
-    /// The checks of all cases, from files of rows that machines of any kind measured; the rows go into the file.
+    /// The checks of all cases, from files of rows of any machines. Writes these rows to the file.
     ///
     /// # Errors
-    /// A case has no rows; rows are of several programs; a file cannot be read or written.
+    /// A case has no rows; rows come from different programs; a file cannot be read or written.
     pub fn merge(&mut self, cases: &[&Case], sources: &[PathBuf]) -> Result<Vec<Vec<Check>>> {
         let rows = gathered::<HardRow>(sources, "hard.csv")?;
         let (mut all, mut without) = (Vec::new(), Vec::new());

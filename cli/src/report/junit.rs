@@ -1,4 +1,4 @@
-//! Checks as JUnit's XML, which CI services read: a suite a mode and group, a case a check.
+//! Checks as JUnit's XML for CI services. Each mode and group is a suite, and each check is a case.
 
 use std::fmt::Write;
 
@@ -37,7 +37,7 @@ fn counts(checks: &[Check]) -> String {
     format!(" tests=\"{all}\" failures=\"{failed}\" errors=\"0\" skipped=\"0\" time=\"{seconds:.3}\"")
 }
 
-/// Text that can stand in an attribute. XML has no other control characters than white space, and a line is expected.
+/// Text for an attribute, on one line. XML allows no control characters except white space.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for letter in text.chars() {

@@ -1,9 +1,9 @@
-//! Prose of pages, in lines that fit.
+//! Wraps the prose of pages.
 
 /// Longest line of prose (characters).
 pub const WIDTH: usize = 120;
 
-/// A text in lines of at most [`WIDTH`], `indent` before each but the first.
+/// A text wrapped at [`WIDTH`], with `indent` before each line except the first.
 pub fn wrapped(text: &str, indent: &str) -> String {
     let mut words = text.split(' ');
     let (mut lines, mut line) = (String::new(), words.next().unwrap_or_default().to_owned());
@@ -18,7 +18,7 @@ pub fn wrapped(text: &str, indent: &str) -> String {
     lines + &line + "\n"
 }
 
-/// Paragraphs and items of lists in lines that fit. Rows of tables stay whole.
+/// Wraps paragraphs and list items. Rows of tables stay whole.
 pub fn wrapped_page(text: &str) -> String {
     let line = |line: &str| {
         if line.starts_with('|') {

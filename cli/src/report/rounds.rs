@@ -16,7 +16,7 @@ pub fn interleave<T>(
     (0..rounds).try_for_each(|round| participants.iter_mut().try_for_each(|participant| turn(round, participant)))
 }
 
-/// The thirds of a run, in turns: the windows that a page shows.
+/// The thirds of a run, as ranges of turns.
 pub fn thirds(turns: usize) -> [Range<usize>; 3] {
     std::array::from_fn(|k| k * turns / 3..(k + 1) * turns / 3)
 }
@@ -26,7 +26,8 @@ pub fn quartiles(turns: &[f64]) -> [f64; 3] {
     [0.25, 0.5, 0.75].map(|q| quantile(turns, q))
 }
 
-/// Processor time of this process for one thread, which depends less on other processes; wall time for several threads and the GPU.
+/// Processor time of this process for one thread, which depends less on other processes; wall time for several threads
+/// and the GPU.
 pub struct Clock {
     processor: bool,
     start: Instant,

@@ -19,9 +19,9 @@ use glam::Vec3;
 /// Bodies whose islands take the same number of substeps.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct EffortRow {
-    /// Substeps of a step.
+    /// Number of substeps in a step.
     pub substeps: u32,
-    /// Number of bodies that are awake and can be pushed.
+    /// Number of awake bodies that can be pushed.
     pub bodies: u32,
 }
 
@@ -49,49 +49,49 @@ pub struct RunReport {
     pub kernel_ms: Vec<KernelRow>,
     /// Bytes per second that the device reads and writes in a copy (B/s), if requested.
     pub copy_bandwidth: Option<f64>,
-    /// Manifolds and points at the end, with those of sleeping bodies.
+    /// Manifolds and points at the end, including those of sleeping bodies.
     pub manifolds: usize,
     pub points: usize,
-    /// Bodies by the substeps that they took in the last step in which a body was awake.
+    /// Bodies by their substeps in the last step with an awake body.
     pub efforts: Vec<EffortRow>,
-    /// Most substeps that a body took in any step.
+    /// Largest number of substeps that a body took in any step.
     pub most_substeps: u32,
-    /// The contact that asked for most substeps in that last step.
+    /// The contact that needed the most substeps in the last step with an awake body.
     pub hardest_contact: Option<HardestContact>,
-    /// Bodies that came and left during the run; none in a scene without such.
+    /// Numbers of bodies that came and left during the run; `None` if no body did.
     pub came: Option<u32>,
     pub left: Option<u32>,
-    /// What each sensor counted.
+    /// The counts of each sensor.
     pub sensors: Vec<SensorCount>,
     pub asleep: usize,
     /// The first step after which a body slept.
     pub first_asleep_step: Option<u32>,
-    /// The step since which all bodies sleep.
+    /// The step from which on all bodies sleep.
     pub all_asleep_step: Option<u32>,
     pub joints: usize,
-    /// Largest distance between the anchors of a joint at the end (m); none without joints.
+    /// Largest distance between the anchors of a joint at the end (m); `None` without joints.
     pub joint_gap: Option<f64>,
-    /// Executed and planned sweeps of all steps; none without a tolerance.
+    /// Completed and planned sweeps of all steps; `None` without a tolerance.
     pub sweeps: Option<u64>,
     pub planned_sweeps: Option<u64>,
-    /// Colors in the last awake step. The values up to `bytes_down` are of this step, but for `overflow`.
+    /// Number of colors in the last awake step. The values up to `bytes_down` are also of this step, except `overflow`.
     pub colors: usize,
-    /// Largest number of manifolds of a step that found no color and were swept alone.
+    /// Largest number of manifolds without a color in a step. They are swept alone.
     pub overflow: usize,
     /// Share of the pairs that reused their manifolds.
     pub reused: f64,
     pub dispatches: usize,
     pub bytes_moved: u64,
-    /// Bytes to the device and back.
+    /// Bytes sent to the device, and read back.
     pub bytes_up: u64,
     pub bytes_down: u64,
-    /// One line for each loss of a device: the step, the reason and the backend that went on.
+    /// One line for each loss of a device: the step, the reason, and the backend that continued.
     pub faults: Vec<String>,
-    /// Overlaps at the end: the deepest, the one that 95 % of the contacts do not exceed, and the mean (m).
+    /// Overlaps at the end (m): the deepest, the 95th percentile, and the mean.
     pub penetration_max: f64,
     pub penetration_p95: f64,
     pub penetration_mean: f64,
-    /// Speed at the end (m/s) of the fastest body; no body if nothing moves.
+    /// Speed of the fastest body at the end (m/s), and the body; `None` if nothing moves.
     pub speed_max: f64,
     pub fastest: Option<String>,
     /// Root mean square speed at the end (m/s).
@@ -99,12 +99,12 @@ pub struct RunReport {
     /// Kinetic energy at the end, and kinetic and potential energy gained since the start (J).
     pub kinetic_energy: f64,
     pub energy_gained: f64,
-    /// Bodies outside the container at the end; none without a container.
+    /// Number of bodies outside the container at the end; `None` without a container.
     pub escaped: Option<usize>,
-    /// Dynamic bodies whose centers of mass moved by less than half of their height since the start.
+    /// Number of dynamic bodies whose center of mass moved by less than half of their height since the start.
     pub in_place: usize,
     pub standing: Vec<Standing>,
-    /// Poses and velocities of the bodies of all worlds at the end, as one number in hexadecimal: [`Simulation::hash`].
+    /// [`Simulation::hash`] at the end, over the bodies of all worlds, in hexadecimal.
     pub hash: String,
     /// Number of bodies whose pose or velocity is not finite, and the first of them.
     pub non_finite: usize,
@@ -117,12 +117,12 @@ pub struct RunReport {
     kernel_times: Vec<(KernelTime, Vec<f64>)>,
     #[serde(skip)]
     energy_before: f64,
-    /// Center of mass and half the height (m) of each body at the start.
+    /// Center of mass (m), and half of the height (m) of each body at the start.
     #[serde(skip)]
     places: Vec<(Vec3, f64)>,
     #[serde(skip)]
     stands: bool,
-    /// Dynamic bodies after the last step.
+    /// Number of dynamic bodies after the last step.
     #[serde(skip)]
     bodies_now: usize,
 }
@@ -161,9 +161,9 @@ pub struct KernelRow {
     pub kernel: &'static str,
     #[serde(flatten)]
     pub ms: Spread,
-    /// Bytes that the kernel last read and wrote; 0 outside the plan.
+    /// Bytes that the kernel read and wrote in its last step; 0 for kernels outside the plan.
     pub bytes: u64,
-    /// Rate of these bytes over that of a copy.
+    /// Rate of these bytes relative to that of a copy.
     pub share_of_copying: Option<f64>,
 }
 
@@ -176,7 +176,8 @@ pub struct StageRow {
 }
 
 impl RunReport {
-    /// A report before the first step of `scene`. It stores the positions of the bodies; the simulation may take the world itself.
+    /// A report before the first step of `scene`. It stores the positions of the bodies, so the simulation can take the
+    /// world itself.
     pub fn new(scene: &Scene, config: &SolverConfig, backend: &dyn Backend) -> Self {
         Self {
             scene: scene.name.clone(),
@@ -208,7 +209,7 @@ impl RunReport {
         }
         let all_sleep = self.asleep > 0 && self.asleep == self.bodies_now;
         self.all_asleep_step = all_sleep.then(|| self.all_asleep_step.unwrap_or(self.steps));
-        // Without a dispatch all bodies slept when the step began.
+        // Without a dispatch, all bodies slept at the start of the step.
         if self.asleep > 0 && stats.dispatches == 0 {
             return;
         }
@@ -244,8 +245,8 @@ impl RunReport {
         self.bytes_down = stats.traffic.down;
     }
 
-    /// Measures the end of the run. The simulation is dropped before contacts are computed anew: both together would take 1.5 times the
-    /// memory of the steps.
+    /// Measures the end of the run. It drops the simulation before it computes contacts anew: both together would take
+    /// 1.5 times the memory of the steps.
     pub fn measure(&mut self, scene: &Scene, mut simulation: Simulation) {
         self.awake_ms = Spread::of(&self.awake_times);
         let names = StepStats::default().times.stages().map(|s| s.0);
@@ -282,7 +283,7 @@ impl RunReport {
         self.energy_gained = energy(world) - self.energy_before;
         self.escaped = scene.container.map(|_| scene.escaped(world));
         self.joint_gap = (!world.joints.is_empty()).then(|| world.joint_gap().into());
-        // As `drystone::metrics::in_place`, from the stored positions.
+        // Like `drystone::metrics::in_place`, but from the stored positions.
         let in_place = |&i: &usize| {
             let begun = self.places.get(i);
             begun.is_some_and(|(center, half_height)| {

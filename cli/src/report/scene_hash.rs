@@ -17,7 +17,8 @@ impl Write for Sink {
     }
 }
 
-/// What the hash sees of a joint: of a ball joint what it saw when there was no other kind.
+/// The part of a joint that the hash reads. For a ball joint it is the format from before other kinds existed, so that
+/// old hashes stay valid.
 struct Content<'a>(&'a Joint);
 
 impl Debug for Content<'_> {
@@ -41,10 +42,11 @@ impl Debug for Content<'_> {
     }
 }
 
-/// 64-bit FNV-1a hash of the bodies, joints, worlds, gravity and the length of a step, as 16 hexadecimal digits. Names do not count.
+/// 64-bit FNV-1a hash of the bodies, joints, worlds, gravity and step length of a scene, as 16 hexadecimal digits.
+/// Names do not count.
 pub fn content_hash(scene: &Scene) -> String {
     let mut sink = Sink(FnvHasher::default());
-    // Writing to a hasher does not fail. Numbers are written with as many digits as tell them apart.
+    // Writing to a hasher does not fail. Numbers are written with enough digits to distinguish them.
     let _ = write!(sink, "{:?} {:?}", scene.dt, scene.world.gravity);
     if !scene.world.own_gravity.is_empty() {
         let worlds = 0..scene.world.world_count();
@@ -58,7 +60,7 @@ pub fn content_hash(scene: &Scene) -> String {
         if (friction_rule, restitution_rule) != (None, None) {
             let _ = write!(sink, "rules {friction_rule:?} {restitution_rule:?}");
         }
-        // Most scenes have neither, and keep the hashes that reports name.
+        // Most scenes have neither torque nor a gravity scale, and keep the hashes that reports contain.
         if (b.torque, b.gravity_scale) != (drystone::glam::Vec3::ZERO, 1.0) {
             let _ = write!(sink, "{:?} {:?}", b.torque, b.gravity_scale);
         }

@@ -1,4 +1,4 @@
-//! Surveys on more than one machine: each takes a part, and the rows of all parts are merged.
+//! Surveys on several machines: each machine runs a part, and the rows of all parts are merged.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use crate::files;
 use drystone::{Error, Result};
 
-/// A part of a survey: of every `of` things in a row the one with this number, counted from 1.
+/// A part of a survey: the one with this number, counted from 1, of every `of` consecutive items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     number: usize,
@@ -20,7 +20,7 @@ impl Shard {
     /// The survey as one part.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
-    /// Whether thing `k` of the survey, counted from 0, is in this part.
+    /// Whether item `k` of the survey, counted from 0, is in this part.
     pub fn has(self, k: usize) -> bool {
         k % self.of + 1 == self.number
     }
@@ -44,7 +44,7 @@ impl FromStr for Shard {
 
 /// A row of a survey, with its origin.
 pub trait Measured: Clone + DeserializeOwned {
-    /// The first column, which no other kind of row has.
+    /// The first column. No other kind of row has it.
     const FIRST: &'static str;
 
     /// Program file and commit.
@@ -54,16 +54,16 @@ pub trait Measured: Clone + DeserializeOwned {
     fn run(&self) -> [&str; 2];
 }
 
-/// The rows of the last run among rows of one thing.
+/// The rows of the last run, among rows of one item.
 pub fn last_run<'a, R: Measured + 'a>(rows: impl Iterator<Item = &'a R> + Clone) -> Vec<R> {
     let last = rows.clone().map(R::run).max();
     rows.filter(|row| Some(row.run()) == last).cloned().collect()
 }
 
-/// The rows of one kind in files of rows; of a folder those in the file `name`.
+/// The rows of one kind from files, or from the file `name` of a folder.
 ///
 /// # Errors
-/// A file cannot be read, or rows are of several programs.
+/// A file cannot be read, or rows come from different programs.
 pub fn gathered<R: Measured>(sources: &[PathBuf], name: &str) -> Result<Vec<R>> {
     let mut all: Vec<(PathBuf, R)> = Vec::new();
     for source in sources {
@@ -95,7 +95,7 @@ fn first_column(path: &Path) -> Result<String> {
     Ok(text.split([',', '\n']).next().unwrap_or_default().trim().to_owned())
 }
 
-/// The error of things without rows.
+/// The error for items without rows.
 pub fn missing(names: &[&str]) -> Result<()> {
     let (count, some) = (names.len(), names.iter().take(5).copied().collect::<Vec<_>>().join(", "));
     let more = if count > 5 { format!(" and {} more", count - 5) } else { String::new() };

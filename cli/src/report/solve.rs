@@ -39,21 +39,21 @@ pub struct SolveReport {
     pub order: Order,
     /// Passes over a manifold before the next one.
     pub passes: u8,
-    /// `f64`, or `reference`, `cpu` or `gpu`, which are in f32.
+    /// `f64`, or a backend in f32: `reference`, `cpu` or `gpu`.
     pub backend: String,
     pub adapter: String,
     pub colors: usize,
-    /// Number of sweeps; the solve ends early if a number is not finite.
+    /// Number of sweeps. The solve ends early if a number is not finite.
     pub sweeps: u32,
-    /// Time of the single sweeps without measurements (ms).
+    /// Total time of the sweeps, without measurements (ms).
     pub ms: f64,
-    /// The sweeps to the errors 1e-1 to 1e-4.
+    /// Sweeps until the errors 1e-1 to 1e-4.
     pub reached: Vec<Reached>,
     /// Errors after each power of two of sweeps, and after the last.
     pub curve: Vec<CurveRow>,
 }
 
-/// The first sweep after which `e_vel` is below an error; none if no sweep reaches it.
+/// The first sweep after which `e_vel` is below an error; `None` if no sweep reaches it.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Reached {
     pub e_vel: f64,
@@ -96,7 +96,7 @@ impl SolveReport {
         report.swept(settings, &mut solver, |solver| solver.advance(1), residuals)
     }
 
-    /// Solves a problem without bodies, in f64 and contact by contact.
+    /// Solves a problem without bodies in f64, contact by contact.
     pub fn of_blocks(problem: &LocalProblem, settings: &SolveSettings) -> Result<Self> {
         let blocks = Blocks::new(problem);
         let mut sweeps = Sweeps::new(&blocks, settings.method, vec![DVec3::ZERO; problem.rows.len()]);
@@ -164,42 +164,39 @@ impl SolveReport {
     }
 }
 
-/// What f64 runs on where no backend does.
+/// The adapter name for f64 without a backend.
 const ADAPTER: &str = "one thread, scalar f64";
 
 /// Report of one solve by Newton's method; its fields are the keys of the JSON object.
 #[derive(Clone, Debug, Serialize)]
 pub struct NewtonReport {
-    /// Name of the problem.
     pub problem: String,
-    /// Bodies that can move; 0 where the problem has none.
+    /// Number of movable bodies; 0 for a problem without bodies.
     pub bodies: usize,
-    /// Contacts.
     pub contacts: usize,
-    /// `newton`.
+    /// Always `newton`.
     pub method: &'static str,
-    /// `f64`.
+    /// Always `f64`.
     pub backend: &'static str,
-    /// Error `e_vel` that was asked for.
+    /// Requested error `e_vel`.
     pub tolerance: f64,
     /// Steps of Newton's method.
     pub iterations: u32,
-    /// Sweeps before and after it.
+    /// Sweeps before and after Newton's method.
     pub sweeps: u32,
-    /// What ended the solve.
+    /// The reason why the solve ended.
     pub ended: Ended,
-    /// What ended Newton's method.
+    /// The reason why Newton's method ended.
     pub newton: NewtonEnded,
     /// Time from the problem in memory to the impulses (ms).
     pub ms: f64,
-    /// Errors of the impulses.
     pub residuals: Residuals,
     /// The impulse of each contact: normal, first and second tangent (N s).
     pub impulses: Vec<[f64; 3]>,
 }
 
 impl NewtonReport {
-    /// Solves a problem to a tolerance, with at most so many sweeps.
+    /// Solves a problem to a tolerance, with at most `most` sweeps.
     pub fn new(problem: &Problem, tolerance: f64, most: u32) -> Self {
         let clock = Clock::of("f64");
         let begin = clock.now();

@@ -1,4 +1,5 @@
-//! The section of docs/convergence.md on other solvers: a table of times, and performance profiles (Dolan and Moré 2002).
+//! The section of docs/convergence.md on other solvers: a table of times, and performance profiles (Dolan and Moré
+//! 2002).
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -9,13 +10,13 @@ use serde::Deserialize;
 use super::plot::{Frame, Look, Scale, Series, svg};
 use drystone::{Error, Result};
 
-/// The solver that is ours in the table.
+/// Name of this library's solver in the table.
 const OURS: &str = "drystone";
 
-/// Solvers of Siconos with a line in a profile: there are colors for six lines.
+/// Number of Siconos solvers with a line in a profile: there are colors for six lines.
 const LINES: usize = 5;
 
-/// One solver on one problem, as benches/against_siconos.py writes it; without a time where the target was not reached.
+/// One solver on one problem, as written by benches/against_siconos.py; without a time if it did not reach the target.
 #[derive(Clone, Debug, Deserialize)]
 struct Row {
     problem: String,
@@ -27,12 +28,10 @@ struct Row {
     iterations: Option<u64>,
 }
 
-/// The section, and its pictures by file name.
+/// The section, and its pictures with file names.
 #[derive(Debug)]
 pub struct Solvers {
-    /// Markdown.
     pub section: String,
-    /// SVG.
     pub pictures: Vec<(String, String)>,
 }
 
@@ -63,19 +62,19 @@ pub fn solvers(path: &Path) -> Result<Solvers> {
     Ok(Solvers { section, pictures })
 }
 
-/// Each once, in the order in which they first come.
+/// Distinct words in the order of their first occurrence.
 fn in_order<'a>(words: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
     let mut seen = BTreeSet::new();
     words.map(String::as_str).filter(|word| seen.insert(*word)).collect()
 }
 
-/// The row of a solver that came to the target.
+/// The row of a solver, if it reached the target.
 fn reached<'a>(rows: &'a [Row], problem: &str, solver: &str, target: &str) -> Option<&'a Row> {
     let is = |row: &&Row| row.problem == problem && row.solver == solver && row.target == target;
     rows.iter().find(is).filter(|row| row.ms.is_some())
 }
 
-/// The fastest row of the others.
+/// The fastest row of another solver.
 fn fastest<'a>(rows: &'a [Row], problem: &str, target: &str) -> Option<&'a Row> {
     let others = rows.iter().filter(|r| r.problem == problem && r.target == target && r.solver != OURS);
     others.filter(|r| r.ms.is_some()).min_by(|a, b| a.ms.partial_cmp(&b.ms).expect("times are numbers"))
@@ -119,7 +118,7 @@ fn times(section: &mut String, rows: &[Row], targets: &[&str]) {
     }
 }
 
-/// How many problems each solver solves.
+/// Writes the number of problems that each solver solves.
 fn solved(section: &mut String, rows: &[Row], targets: &[&str]) {
     section.push_str("\nProblems that each solver solves (for global solvers only global problems):\n\n| solver |");
     targets.iter().for_each(|target| section.push_str(&format!(" {target} |")));
@@ -136,7 +135,8 @@ fn solved(section: &mut String, rows: &[Row], targets: &[&str]) {
     }
 }
 
-/// Times of a solver relative to the fastest of each problem, ascending; problems that it does not solve are left out.
+/// Times of a solver relative to the fastest solver of each problem, ascending. Problems that it does not solve are
+/// left out.
 fn ratios(rows: &[Row], solver: &str, target: &str) -> Vec<f64> {
     let ratio = |problem: &str| {
         let own = reached(rows, problem, solver, target)?.ms?;
@@ -152,7 +152,7 @@ fn profile(rows: &[Row], target: &str) -> String {
     let count = in_order(rows.iter().map(|r| &r.problem)).len() as f64;
     let mut others: Vec<_> =
         in_order(rows.iter().map(|r| &r.solver)).into_iter().filter(|&solver| solver != OURS).collect();
-    // By problems solved, and then by time.
+    // Sort by solved problems, then by time.
     let rank = |solver: &str| {
         let ratios = ratios(rows, solver, target);
         (std::cmp::Reverse(ratios.len()), ratios.iter().map(|r| r.ln()).sum::<f64>())

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use crate::files::Draft;
 use drystone::{BodyKind, Error, Result, World};
 
-/// A CSV file with the columns `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`: center of mass, world axes. `finish` puts
-/// it under its name.
+/// A CSV file with the columns `step,time,body,px,py,pz,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz`: center of mass, world axes. It
+/// appears under its name after `finish`.
 pub struct Trajectory {
     path: PathBuf,
     writer: csv::Writer<File>,

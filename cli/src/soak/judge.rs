@@ -56,7 +56,7 @@ pub fn judge(rows: &[Row]) -> Result<Vec<Check>> {
         let [then, now] = [second, last].map(|rows| median(&rows.iter().map(of).collect::<Vec<_>>()));
         // Treat a value below a hundredth as zero: rounding alone can change it by any factor.
         let ratio = if then.max(now) < 0.01 { 1.0 } else { now / then };
-        let what = format!("{what}, the last tenth over the second");
+        let what = format!("{what}: last tenth of the steps divided by the second tenth");
         match level {
             Level::Below(most) => check(what, ratio, Limit::AtMost(most)),
             Level::Within(most) => {

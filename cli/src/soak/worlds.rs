@@ -11,12 +11,11 @@ use glam::{Quat, Vec3};
 pub const WORLDS: &[(&str, &str)] = &[
     ("drum", "60 boxes in a drum that turns"),
     ("shaken", "60 boxes in a tray that is shaken"),
-    ("rain", "60 bodies of five shapes, one of which goes and comes every third step, some joined"),
-    ("waking", "24 boxes that sleep, one of which is thrown every four seconds"),
+    ("rain", "60 bodies of five shapes, some joined; one is replaced every third step"),
+    ("waking", "24 sleeping boxes; one is thrown every four seconds"),
     ("conveyor", "boxes that come onto rollers, ride along and leave"),
 ];
 
-/// Their names.
 pub const NAMES: [&str; WORLDS.len()] = {
     let mut names = [""; WORLDS.len()];
     let mut i = 0;

@@ -133,7 +133,7 @@ fn is_folder(path: &Path) -> bool {
 
 fn unknown(path: &Path) -> Error {
     let path = path.display();
-    Error::input(format!("{path}: pictures are written as .png, .gif, .mp4 or to a folder, with a slash at the end"))
+    Error::input(format!("{path}: must end in .png, .gif or .mp4, or in / for a folder"))
 }
 
 fn failed(path: &Path, e: impl std::fmt::Display) -> Error {

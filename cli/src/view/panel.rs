@@ -5,7 +5,6 @@ use drystone::config::Friction;
 use drystone_maze::{BOARDS, Outcome};
 use drystone_view::{ColorBy, Labyrinth, Live, Order, Show};
 
-/// A show with a panel.
 pub trait Panel: Show {
     fn panel(&mut self, ui: &mut egui::Ui);
 }

@@ -40,7 +40,7 @@ pub fn recorded(scene: Scene, color: ColorBy, path: &Path) -> Result<Film> {
         last = Some((step, time));
         let bodies = world.bodies.len();
         let Some(body) = world.bodies.get_mut(index).filter(|b| b.kind != BodyKind::Fixed) else {
-            return Err(refuse(format!("body {index} is not one of the {bodies} of the scene that can move")));
+            return Err(refuse(format!("body {index} is fixed, or not among the {bodies} bodies of the scene")));
         };
         body.rotation = Quat::from_xyzw(qx, qy, qz, qw);
         body.position = Vec3::from_array(place) - body.rotation * body.mass.center;
@@ -48,7 +48,7 @@ pub fn recorded(scene: Scene, color: ColorBy, path: &Path) -> Result<Film> {
     }
     match last {
         Some((_, time)) => film.add_world(time, &world),
-        None => return Err(Error::input(format!("{}: no motion in it", path.display()))),
+        None => return Err(Error::input(format!("{}: the file has no rows", path.display()))),
     }
     Ok(film)
 }

@@ -64,7 +64,7 @@ fn auto_takes_the_cpu_for_small_and_large_scenes() {
 fn the_list_of_adapters_says_that_there_is_none() {
     let output = without_adapter("adapters");
     assert_eq!(output.status.code(), Some(0));
-    assert_eq!(String::from_utf8_lossy(&output.stdout), "none; everything runs on the CPU\n");
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "no adapters; everything runs on the CPU\n");
 }
 
 fn adapters_are_listed_with_their_abilities() {

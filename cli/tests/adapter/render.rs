@@ -50,7 +50,7 @@ fn bad_requests_are_refused_in_one_line_before_the_run() {
     assert_refused("render pile -p n=8 --out nowhere/x.png", none, 2, &["nowhere/x.png"]);
     assert_refused("render pile -p n=8 --out x.png --frames 3", none, 2, &["--frames 3", ".gif"]);
     assert_refused("render tower --out x.png --from short.csv", none, 2, &["short.csv", "line 2"]);
-    assert_refused("render tower --out x.png --from empty.csv", none, 2, &["empty.csv", "no motion"]);
+    assert_refused("render tower --out x.png --from empty.csv", none, 2, &["empty.csv", "no rows"]);
     assert_refused("render tower --out x.png --from other.csv", none, 2, &["other.csv", "line 2", "body 99"]);
     assert_refused("render tower --out x.png --from other.csv --color batch", none, 2, &["contacts", "speed"]);
     assert_refused("render tower --out x.png --size 16384x16384", none, 2, &["16384x16384"]);

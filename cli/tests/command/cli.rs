@@ -155,7 +155,7 @@ fn a_run_writes_its_end_as_a_scene_file_that_can_be_run_again() {
     assert!(later["penetration_max"].as_f64() < Some(5e-3) && ran["non_finite"] == 0);
     let refused = folder.run(&["run", "tower", "--worlds", "2", "--steps", "1", "--out-scene", "two.json"]);
     let line = text(&refused.stderr);
-    assert!(!refused.status.success() && line.contains("--out-scene: a scene file holds one world"), "{line}");
+    assert!(!refused.status.success() && line.contains("--out-scene: a scene file has room for one world"), "{line}");
     assert_eq!(folder.files(), ["again.json", "later.json"]);
 }
 
@@ -467,7 +467,7 @@ fn a_scene_that_does_not_fit_into_memory_is_refused_before_it_is_built() {
         Command::new("sh").args(["-c", &line]).env("DRYSTONE_ADAPTER", "none").output().expect("sh")
     };
     for (arguments, named) in [
-        ("run pile -p n=4000000", "pile: 4000000 bodies: at least 8.0 GB of memory, of which 4"),
+        ("run pile -p n=4000000", "pile: 4000000 bodies: at least 8.0 GB of memory needed, 4"),
         ("run tower -p n=1 --worlds 4000000", "tower: 4000000 worlds of 2 bodies: at least 16.0 GB"),
         ("bench drum:n=1000000,worlds=4", "4 worlds of 1000001 bodies: at least 8.0 GB"),
     ] {

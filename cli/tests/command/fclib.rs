@@ -127,9 +127,9 @@ fn a_problem_without_bodies_is_solved_in_double_precision_and_refused_on_lanes_a
         assert!(report["curve"][0]["e_vel"].as_f64() < Some(1e-6), "{report}");
     }
     for (arguments, named) in [
-        ("solve ball.hdf5 --backend cpu", &["ball.hdf5: fclib_local: has no bodies", "f64", "cpu does not"][..]),
-        ("solve ball.hdf5 --backend gpu", &["has no bodies", "gpu does not"]),
-        ("solve ball.hdf5 --order manifolds", &["has no bodies", "by contacts"]),
+        ("solve ball.hdf5 --backend cpu", &["ball.hdf5: fclib_local: has no bodies", "use --backend f64, not cpu"][..]),
+        ("solve ball.hdf5 --backend gpu", &["has no bodies", "use --backend f64, not gpu"]),
+        ("solve ball.hdf5 --order manifolds", &["has no bodies", "use --order contacts"]),
         ("solve rolling.hdf5", &["rolling.hdf5: fclib_local_rolling: rolling friction cannot be read"]),
         ("export ball.hdf5 --fclib out.hdf5", &["ball.hdf5: fclib_local: has no bodies, but bodies are needed"]),
     ] {

@@ -43,7 +43,7 @@ pub(super) async fn check_limits(run: &mut Run<'_>) {
         refused(run, options).await
     })
     .await;
-    run.check(Group::Limits, "memory that is not there is refused", async |run| {
+    run.check(Group::Limits, "an allocation beyond the memory is refused", async |run| {
         let options = GpuOptions { memory: 10_000, ..run.gpu_options() };
         refused(run, options).await
     })
@@ -79,7 +79,7 @@ async fn large_buffers(run: &mut Run<'_>) -> Outcome {
     if if run.is_exact() { count_of_numbers > 0 } else { apart > PLAIN_PASS } {
         return failed!("{count} bodies in {mib} MiB: {count_of_numbers} numbers differ, by {apart:.1e}");
     }
-    Ok(format!("{count} bodies in {mib} MiB, apart by {apart:.1e}"))
+    Ok(format!("{count} bodies in {mib} MiB, largest difference {apart:.1e}"))
 }
 
 /// Checks that a device with these options refuses a step in one line, and that the processor then runs it.
@@ -126,9 +126,9 @@ pub(super) async fn check_long_plans(run: &mut Run<'_>) {
             near(run, &ours, &cut)?;
         }
         if submissions > 1 {
-            Ok(format!("{submissions} submissions, the bits of one"))
+            Ok(format!("{submissions} submissions, the same bits as in one"))
         } else {
-            failed!("it was not cut")
+            failed!("the plan was not split")
         }
     })
     .await;
@@ -167,7 +167,7 @@ pub(super) async fn check_losses(run: &mut Run<'_>) {
     let cases: [(&str, Losses, &str); 3] = [
         ("a device lost between two steps", &[(1, false)], "gpu"),
         ("a device lost during a step", &[(2, true)], "gpu"),
-        ("the processor goes on after three devices", &[(1, true), (1, false), (1, true)], "cpu"),
+        ("the CPU continues after three lost devices", &[(1, true), (1, false), (1, true)], "cpu"),
     ];
     for (name, losses, goes_on) in cases {
         run.check(Group::DeviceLost, name, async |run| {
@@ -189,7 +189,7 @@ pub(super) async fn check_losses(run: &mut Run<'_>) {
             match (lines.first(), theirs.simulation.backend().name()) {
                 (None, _) => failed!("the loss was not noticed"),
                 (Some(_), name) if name != goes_on => {
-                    failed!("{name} goes on, and not {goes_on}: {}", lines.join("; "))
+                    failed!("{name} continues instead of {goes_on}: {}", lines.join("; "))
                 }
                 (Some(line), _) => Ok(line.clone()),
             }
@@ -203,8 +203,8 @@ fn same_worlds(a: &Warm, b: &Warm) -> std::result::Result<(), Failure> {
     BodyDifference::first(&a.simulation.world, &b.simulation.world).map_or(Ok(()), |first| failed!("{first}"))
 }
 
-/// Fails unless a run is as near to the reference as a few steps of plain WGSL; in exact mode it needs the same bits.
-/// The median body counts: if surfaces just touch, rounding decides whether a contact is stiff or soft, and that
+/// Fails unless a run is as near to the reference as a few steps of plain WGSL are. In exact mode it needs the same
+/// bits. The median body counts: if surfaces just touch, rounding decides whether a contact is stiff or soft, and that
 /// affects few bodies.
 fn near(run: &Run, ours: &Warm, theirs: &Warm) -> std::result::Result<(), Failure> {
     if run.is_exact() {

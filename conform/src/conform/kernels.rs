@@ -73,7 +73,7 @@ async fn of_kernel(run: &mut Run<'_>, kernels: &[Kernel], problems: &[StepProble
     Ok(if run.is_exact() {
         format!("{count} runs, the same bits")
     } else {
-        format!("{count} runs, apart by {worst:.1e} of {PLAIN_PASS:.0e}")
+        format!("{count} runs, largest difference {worst:.1e}, limit {PLAIN_PASS:.0e}")
     })
 }
 

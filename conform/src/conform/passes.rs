@@ -34,8 +34,8 @@ pub fn every_rules() -> Vec<Rules> {
             // Velocities since the start of the step are combined with every sum of velocities without the rules below.
             let plain = rules.accumulated && !(rules.friction_first || rules.round || rules.measured || rules.driven);
             // Equal moments of inertia are combined with every impulse without the rules above. Without friction,
-            // `friction_first` makes no difference. Belts drive only points. Belts and repeated passes are not combined with all other
-            // rules again.
+            // `friction_first` makes no difference. Belts drive only points. Belts and repeated passes are not combined
+            // with all other rules again.
             let drivable = matches!(friction, FrictionRule::Box | FrictionRule::Disc)
                 && rules.accumulated
                 && !(rules.patch || rules.round || rules.measured);
@@ -207,8 +207,8 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
     ways
 }
 
-/// Moves bodies, then factors the joints of all systems and solves them twice: the second time at the corrections that
-/// the first one left.
+/// Moves bodies, then factors the joints of all systems and solves them twice. The second solution starts from the
+/// corrections of the first.
 fn system_sweep(rules: Rules, problem: &StepProblem) -> Vec<Pass> {
     let (turn, factor) = (Kernel::TurnInertias, Kernel::BeginSystems);
     let move_bodies = Kernel::IntegratePositions { from_start: rules.from_start };

@@ -1,4 +1,4 @@
-//! Random problems. Every row is valid, but the rows do not form a scene.
+//! Random problems. Every row is valid, but the rows do not describe a scene.
 #![allow(clippy::field_reassign_with_default)]
 
 use glam::{Mat3, Quat, Vec3};
@@ -55,14 +55,14 @@ impl Random {
 
 /// Bodies of a random problem. One in five cannot move.
 const BODIES: u32 = 200;
-/// Contacts of a random problem: some of its colors are then larger than a workgroup.
+/// Contacts of a random problem. Some of its colors are then larger than a workgroup.
 const CONTACTS: u32 = 600;
-/// Contacts that take no part.
+/// Contacts that take no part in the sweeps.
 const IDLE: usize = 5;
 /// Joints of a random problem.
 const JOINTS: u32 = 300;
-/// The most of them that are solved at once. One thread factors them again and again, and llvmpipe ends the loops of a program after 65,535
-/// iterations.
+/// Largest number of joints that are solved at once. One thread factors them again and again, and llvmpipe ends the
+/// loops of a program after 65,535 iterations.
 const JOINTS_AT_ONCE: u32 = 60;
 
 fn is_movable(body: u32) -> bool {
@@ -70,7 +70,7 @@ fn is_movable(body: u32) -> bool {
 }
 
 /// A problem in color order with 1 to 4 points a contact, and patches if `patches`. Numbers are of order 1; a substep
-/// turns bodies by up to 3 rad, so that every term of every series counts.
+/// turns bodies by up to 3 rad, so that every term of each series matters.
 pub fn problem(seed: u64, patches: bool) -> StepProblem {
     let random = &mut Random::new(seed);
     let mut problem = StepProblem::default();
@@ -90,7 +90,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     let (contacts, coloring) = colored(random, CONTACTS);
     let contact_colors = coloring.color_count() as u32;
     (problem.order, problem.colors) = (coloring.order, coloring.offsets);
-    // The last of them take no part.
+    // The last ones take no part in the sweeps.
     for bodies in contacts.into_iter().chain([[1, 2]; IDLE]) {
         let first_point = problem.points.len() as u32;
         let point_count = 1 + random.below(4);
@@ -102,7 +102,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     }
     problem.totals = problem.impulses.iter().rev().copied().collect();
     let (joints, coloring) = colored(random, JOINTS);
-    // The last colors are solved at once.
+    // The joints of the last colors are solved at once.
     let direct = coloring.offsets.iter().take_while(|&&first| JOINTS - first > JOINTS_AT_ONCE).count();
     let at_once = coloring.order[coloring.offsets[direct] as usize..].to_vec();
     problem.colors.extend(coloring.offsets[1..].iter().map(|end| end + CONTACTS));
@@ -137,7 +137,7 @@ pub fn problem(seed: u64, patches: bool) -> StepProblem {
     problem
 }
 
-/// Puts some joints into one system, and lets the inertia of half of the bodies turn.
+/// Puts some joints into one system, and lets the inertia of half of the bodies rotate.
 fn solve_at_once(random: &mut Random, problem: &mut StepProblem, joints: &[u32]) {
     let mut nodes = Vec::new();
     for &joint in joints {
@@ -154,7 +154,7 @@ fn solve_at_once(random: &mut Random, problem: &mut StepProblem, joints: &[u32])
         [side(row.body_a), side(row.body_b)]
     };
     assert!(problem.systems.add(&nodes, sides, usize::MAX));
-    // More joints than the bodies can follow: soft ones, or S would be near to singular.
+    // There are more joints than the bodies can satisfy. Without softness, S would be nearly singular.
     problem.systems.softness[0] = 1.0;
     for body in (0..BODIES).filter(|&body| is_movable(body)) {
         if random.happens(0.5) {
@@ -164,7 +164,7 @@ fn solve_at_once(random: &mut Random, problem: &mut StepProblem, joints: &[u32])
     }
 }
 
-/// The same problem with everything that moves, pushes or separates scaled by `scale`.
+/// The same problem with all velocities, accelerations, impulses, separations and gaps scaled by `scale`.
 pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     let scale = |x: &mut f32| *x *= scale;
     for row in &mut problem.bodies {
@@ -185,7 +185,7 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     problem
 }
 
-/// The same problem with masses `factor` times as large, and impulses with them.
+/// The same problem with masses and impulses `factor` times as large.
 pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
     let lighter = |x: &mut f32| *x *= 1.0 / factor;
     let scale = |x: &mut f32| *x *= factor;
@@ -204,8 +204,8 @@ pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
     problem
 }
 
-/// The same problem with spins `factor` times as fast, and moments of inertia with other ratios: some are those of a
-/// solid, others go up to 1:1000.
+/// The same problem with spins `factor` times as fast and moments of inertia of other ratios: some are possible for a
+/// solid, others are up to 1:1000.
 pub fn faster(mut problem: StepProblem, factor: f32) -> StepProblem {
     problem.bodies.iter_mut().flat_map(|row| &mut row.w).for_each(|w| *w *= factor);
     for (k, row) in problem.inertias.iter_mut().enumerate() {
@@ -240,7 +240,7 @@ fn params(problem: &StepProblem, patches: bool) -> Params {
     params
 }
 
-/// The bodies of `count` random constraints in color order, and the start of each color and the end of the last.
+/// The bodies of `count` random constraints in color order, the start of each color, and the end of the last one.
 fn colored(random: &mut Random, count: u32) -> (Vec<[u32; 2]>, Coloring) {
     let pairs: Vec<_> = (0..count).map(|_| random_pair(random)).collect();
     let place = |body: u32| if is_movable(body) { body } else { IMMOVABLE };
@@ -307,7 +307,7 @@ fn contact_row(random: &mut Random, [body_a, body_b]: [u32; 2], first_point: u32
     row
 }
 
-/// Some bodies lose nothing, some of one velocity only, some of both.
+/// The damping of a body: of no velocity, of one, or of both.
 fn damping_row(body: u32) -> DampingRow {
     let mut row = DampingRow::default();
     if is_movable(body) && !body.is_multiple_of(4) {
@@ -322,7 +322,7 @@ fn damping_row(body: u32) -> DampingRow {
 }
 
 fn point_row(random: &mut Random, patches: bool) -> PointRow {
-    // A slip direction, or a distance from the patch.
+    // A slip direction for a point without patches, else a distance from the center of the patch.
     let (sin, cos) = random.within(0.0, std::f32::consts::TAU).sin_cos();
     let [slip_1, slip_2] = if patches { [sin.abs(), 0.0] } else { [sin, cos] };
     PointRow {
@@ -337,7 +337,7 @@ fn point_row(random: &mut Random, patches: bool) -> PointRow {
     }
 }
 
-/// The impulse of a point, which pushes, or of a patch, which twists in either direction.
+/// The impulse of a point, which is not negative, or of a patch, which can twist in either direction.
 fn impulse_row(random: &mut Random, patch: bool) -> ImpulseRow {
     let least = if patch { -2.0 } else { 0.0 };
     let normal = if random.happens(0.3) { 0.0 } else { random.within(least, 2.0) };

@@ -125,6 +125,6 @@ async fn of_single_steps(run: &mut Run<'_>, mut ours: Warm) -> Outcome {
     }
     run.give_back(gpu);
     let (middle, most) = (median(&apart) / speed, PLAIN_SCENE);
-    let figure = format!("apart by {middle:.1e} of the largest speed in the middle step, of {most:.0e}");
+    let figure = format!("median difference {middle:.1e} of the largest speed, limit {most:.0e}");
     if middle <= most { Ok(figure) } else { failed!("{figure}") }
 }

@@ -59,7 +59,7 @@ impl ContactProblem {
         let mut problem = Self::default();
         reader.row("contacts", |f| match f.take::<u32>("version")? {
             1 => Ok(()),
-            version => Err(input!("version {version}: only 1 is known")),
+            version => Err(input!("version {version}: only version 1 is supported")),
         })?;
         problem.name = reader.next("the name")?.trim().to_owned();
         let (bodies, contacts) = reader.row("bodies", |f| {

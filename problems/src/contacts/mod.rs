@@ -163,7 +163,7 @@ pub enum Problem {
 }
 
 #[cfg(not(feature = "fclib"))]
-const NO_HDF5: &str = "an HDF5 file: drystone was built without the feature fclib, which is needed to read it";
+const NO_HDF5: &str = "an HDF5 file needs the feature fclib, but drystone was built without it";
 
 #[cfg(not(feature = "fclib"))]
 impl ContactProblem {

@@ -95,7 +95,7 @@ fn hand(index: usize, contact: &PointContact) -> Result<f64> {
         Ok(-1.0)
     } else {
         let t_2 = t_2.to_array();
-        Err(input!("contact {index}: second tangent {t_2:?} is not the normal times the first"))
+        Err(input!("contact {index}: second tangent {t_2:?}: must be plus or minus normal × first tangent"))
     }
 }
 

@@ -6,10 +6,10 @@
 //! ([`drystone::stages::kernels::momentum`]).
 //!
 //! Sweeps update velocities together with impulses, and rounding makes the two drift apart: in f32 by about 3e-8 of the
-//! free velocities per sweep, and by more with momentum. Therefore velocities are recomputed from the impulses in f64
-//! after every 64 plain sweeps and after each end of momentum. Errors e_vel in f32 without and with this correction,
-//! after 1000 accelerated sweeps: Spheres-i099 4e-5 and 2e-7, KaplaTower-135 4e-5 and 1e-7, mj_wall 2e-3 and 6e-5,
-//! tower10 5e-4 and 1e-4.
+//! free velocities per sweep, and by more with momentum. So velocities are recomputed from the impulses in f64 after
+//! every 64 plain sweeps and after each end of momentum. Errors e_vel in f32 without and with this correction, after
+//! 1000 accelerated sweeps: Spheres-i099 4e-5 and 2e-7, KaplaTower-135 4e-5 and 1e-7, mj_wall 2e-3 and 6e-5, tower10
+//! 5e-4 and 1e-4.
 
 mod assemble;
 pub mod newton;
@@ -149,7 +149,8 @@ impl<'a> Solver<'a> {
                 Work::Exact(reference) => reference.advance(&self.problem, &plan.passes),
                 Work::Rounded(backend) => backend.run(&mut self.problem, &plan.passes)?,
             }
-            // Right after a restart, the result does not depend on the velocities of the sweep before: it is a new start, too.
+            // Right after a restart, the result does not depend on the velocities of the sweep before: it is a new
+            // start, too.
             let is_new = self.since == if self.method == Method::Plain { DRIFT_SWEEPS } else { LONGEST_MOMENTUM };
             if is_new {
                 self.since = 0;

@@ -42,7 +42,8 @@ pub(super) fn pile_mixed(n: usize, jitter: f64, seed: u64, kinds: usize) -> Resu
     })
 }
 
-/// `n` bodies of at most 1 m on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between four walls.
+/// `n` bodies of at most 1 m on a 1.2 m grid, each shifted by up to `jitter` and turned a little, above a floor between
+/// four walls.
 fn heap(
     name: &str,
     n: usize,

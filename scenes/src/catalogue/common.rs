@@ -22,7 +22,7 @@ pub(super) fn unit_box() -> Body {
     Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5))
 }
 
-/// Position of the k-th of `n` evenly spaced things relative to their middle, in pitches.
+/// Position of the k-th of `n` evenly spaced items relative to their middle, in pitches.
 pub(super) fn centered(k: usize, n: usize) -> f64 {
     k as f64 - (n as f64 - 1.0) / 2.0
 }

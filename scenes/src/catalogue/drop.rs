@@ -54,7 +54,8 @@ fn tilted_plate() -> Result<Shape> {
     Shape::mesh((0..side * side).map(vertex).collect(), triangles)
 }
 
-/// Waves along x, two pitches long in all, with a trough at each quarter of the way: 0.1 m deep.
+/// Waves along x, two pitches long in total and 0.1 m deep, with troughs at one quarter and three quarters of the
+/// length.
 fn waves() -> Result<Shape> {
     let columns = 4 * CELLS;
     let row: Vec<f32> =

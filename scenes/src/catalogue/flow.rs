@@ -67,7 +67,7 @@ pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     let arm = Shape::cuboid(0.94 * WIDTH, 0.2, 0.03);
     let across = about(Vec3::Y, FRAC_PI_2);
     let cross = Body::dynamic().named("cross").shape(arm.clone()).shape_at(arm, Vec3::ZERO, across).total_mass(10.0);
-    // As smooth as ice: with more friction a ball and the wall can jam an arm between them forever.
+    // Almost no friction: with more, a ball and the wall can jam an arm between them forever.
     let cross = cross.friction(0.02);
     let at = place(0.0, 0.35, 0.5 * WIDTH);
     let cross = world.add(cross.groups(groups(arms, balls)).position(at.x, at.y, at.z).rotation(slope));

@@ -191,7 +191,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "mass-ratio",
-        summary: "a stack of cubes, light and heavy in turn, a light one lowest: it stands 1.5 mm deep, 0.01 mm with substeps=32",
+        summary: "a stack of alternating light and heavy cubes, the lowest light: it stands with 1.5 mm overlap, 0.01 mm with substeps=32",
         parameters: &[
             CUBES,
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
@@ -251,7 +251,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "four-bar",
-        summary: "a motor turns a crank, and a coupler swings a rocker: between the angles that their lengths give",
+        summary: "a motor turns a crank, and a coupler swings a rocker: it stays within the angles that follow from the lengths",
         parameters: &[Parameter::real("speed", 6.0, (-20.0, 20.0), "speed of the crank [rad/s]")],
         bodies: |_| 3.0,
         build: |v| Ok(machines::four_bar(v[0] as f32)),
@@ -415,7 +415,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "galton",
-        summary: "balls fall past rows of pins into bins, and sensors count them: all that came pass the gate, and each is in a bin",
+        summary: "balls fall past rows of pins into bins, and sensors count them: every ball passes the gate and ends in a bin",
         parameters: &[
             Parameter::whole("n", 60, (1.0, 1000.0), "number of balls"),
             Parameter::whole("rows", 8, (2.0, 50.0), "rows of pins; one bin more"),
@@ -454,7 +454,7 @@ pub static CATALOGUE: &[Entry] = &[
             Parameter::word("kind", &Family::NAMES, "family of worlds"),
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of all that is drawn"),
         ],
-        // Only drawing the world tells the number: at most a few hundred.
+        // Only a drawn world has this number. It is at most a few hundred.
         bodies: |v| families::drawn(v[0] as usize, v[1] as u64).map_or(0.0, |scene| scene.world.dynamic_count() as f64),
         build: |v| families::drawn(v[0] as usize, v[1] as u64),
     },

@@ -46,7 +46,8 @@ impl Turn {
 }
 
 /// Frequency (Hz) and damping ratio of an axis along Y between a chassis and a wheel of `wheel` kg at `arm`, for a
-/// stiffness (N/m) and a damping (N s/m): a spring is set by the mass that it moves, and that is mainly the wheel.
+/// stiffness (N/m) and a damping (N s/m): frequency and damping ratio refer to the mass that the spring moves, which is
+/// mainly the wheel.
 pub(super) fn suspension(chassis: &Body, arm: Vec3, wheel: f32, [stiffness, damping]: [f32; 2]) -> (f32, f32) {
     let corner = 1.0 / chassis.mass.mass + {
         let about = arm.cross(Vec3::Y);

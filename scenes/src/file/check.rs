@@ -51,7 +51,7 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
 }
 
 pub(super) fn unknown_version(version: impl Display) -> Error {
-    input!("version = {version}: only version 1 is known")
+    input!("version = {version}: only version 1 is supported")
 }
 
 /// The name of a body in messages: its index and, if it has one, its name.

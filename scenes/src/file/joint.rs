@@ -25,7 +25,7 @@ impl BodyRef {
         let count = world.bodies.len();
         match self {
             Self::Index(index) if *index < count => Ok(*index),
-            Self::Index(index) => Err(input!("body {index}: there are {count}, counted from 0")),
+            Self::Index(index) => Err(input!("body {index}: must be less than {count}, the number of bodies")),
             Self::Name(name) => {
                 let mut named = (0..count).filter(|&i| world.bodies[i].name == *name);
                 match (named.next(), named.next()) {
@@ -46,7 +46,7 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
     let (a, b) = match &bodies[..] {
         [a] => (a.find(world)?, None),
         [a, b] => (a.find(world)?, Some(b.find(world)?)),
-        _ => return Err(input!("{} bodies: a joint ties one or two", bodies.len())),
+        _ => return Err(input!("{} bodies: a joint connects one or two", bodies.len())),
     };
     ensure(b != Some(a), || format!("bodies {} and {}: the same body twice", bodies[0], bodies[1]))?;
     let dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;

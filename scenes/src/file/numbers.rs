@@ -14,7 +14,8 @@ const UNIT_TOLERANCE: f64 = 1e-3;
 /// Largest error of the length of a quaternion by rounding to single precision.
 const ROUNDING: f64 = 3.0 * f32::EPSILON as f64;
 
-/// The values in single precision if each of them `fits`; else an error that says what the values `must` be.
+/// The values in single precision, if all of them are finite and `fits` accepts each. Otherwise an error with the
+/// requirement `must`.
 pub(super) fn checked<const N: usize>(
     name: impl Display,
     values: [f64; N],

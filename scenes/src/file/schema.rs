@@ -87,7 +87,7 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Spawner")]
 pub struct SpawnerFile {
-    /// The body at its start; it can say when it leaves.
+    /// The body at its start. Its key `leaves` determines when it leaves.
     pub body: BodyFile,
     /// Steps before the first body.
     #[serde(default)]
@@ -108,7 +108,7 @@ pub struct LeavesFile {
     /// Its center of mass is below this height (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub below: Option<f64>,
-    /// This time is over (s), 0 or more.
+    /// Its age has reached this time (s), 0 or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<f64>,
 }
@@ -220,7 +220,7 @@ pub struct AdditionalMassFile {
     /// Its center (m).
     #[serde(default)]
     pub center: [f64; 3],
-    /// Moments of inertia about its principal axes through its center (kg m²), 0 or more: 0 of a point mass.
+    /// Moments of inertia about its principal axes through its center (kg m²), 0 or more; 0 for a point mass.
     #[serde(default)]
     pub principal_inertia: [f64; 3],
     /// Rotation from its principal axes to the body's frame: a quaternion x, y, z, w.
@@ -261,7 +261,7 @@ pub struct ShapeFile {
     /// The material of the shape, in place of that of the body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<MaterialFile>,
-    /// The geometry of the shape. A key that neither part knows is refused.
+    /// The geometry of the shape. An unknown key is refused.
     #[serde(flatten)]
     pub geometry: Geometry,
 }
@@ -374,7 +374,7 @@ pub struct JointFile {
     /// The force at which the joint breaks (N), averaged over a step, more than 0; by default the joint never breaks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub break_force: Option<f64>,
-    /// The kind of joint. A key that neither part knows is refused.
+    /// The kind of joint. An unknown key is refused.
     #[serde(flatten)]
     pub kind: JointKind,
 }

@@ -17,7 +17,7 @@ use drystone::{Axis, Body, BodyKind, Bounds, Drive, Error, Joint, Linear, Materi
 pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
     let world = &scene.world;
     let worlds = world.world_count();
-    ensure(worlds == 1, || format!("a scene file holds one world, and there are {worlds} beside each other"))?;
+    ensure(worlds == 1, || format!("a scene file has room for one world, but this scene has {worlds}"))?;
     if let Some(i) = world.first_non_finite() {
         return Err(input!(
             "body {i} {:?}: its numbers are not finite: a scene file cannot represent them",

@@ -76,7 +76,8 @@ pub(super) fn load_bodies(
         let state = State { velocity: row(&body[..8]), movement: row(&body[8..]), mass: row(&mass[..8]) };
         let [x, y, z] = problem.masses[i].acceleration;
         let [turn_x, turn_y, turn_z] = problem.torques.get(i).unwrap_or(&TorqueRow::NONE).angular_acceleration;
-        // SAFETY: tasks have different bodies (`in_groups` cuts their range), and `Partition::give_slots` gives each a slot of its own.
+        // SAFETY: tasks have different bodies (`in_groups` cuts their range), and `Partition::give_slots` gives each a
+        // slot of its own.
         unsafe {
             states.write(slots[i] as usize, state);
             accelerations.write(slots[i] as usize, Row8([x, y, z, 0.0, turn_x, turn_y, turn_z, 0.0]));
@@ -104,7 +105,7 @@ pub(super) struct BodyWork<'a> {
     pub free: Shared<'a, Row8>,
     /// Acceleration, then angular acceleration.
     pub accelerations: &'a [Row8],
-    /// Rows of damping; none where no body is damped.
+    /// Rows of damping; empty if no body is damped.
     pub dampings: &'a [Row8],
 }
 
@@ -194,7 +195,8 @@ impl Work for TurningWork<'_> {
             for ((begin, place_of), (slot, row)) in begin.iter_mut().zip(&mut places).zip(rows) {
                 (*begin, *place_of) = (*row, place(*slot as usize));
             }
-            // SAFETY: the places are those of states that no other task has; `NEIGHBORING_ROWS` are the places of the rows.
+            // SAFETY: the places are those of states that no other task has; `NEIGHBORING_ROWS` are the places of the
+            // rows.
             let (body, [xx, xy, xz, inv_mass, yy, yz, zz, zero]) = unsafe {
                 (wide_body::<L>(self.bodies.as_ptr(), &places), L::gathered(begin.as_ptr(), &NEIGHBORING_ROWS))
             };

@@ -195,7 +195,8 @@ impl<'a> SharedFactors<'a> {
         let (nodes, blocks) = (systems.nodes_of(system).len(), systems.blocks_of_system(system).len());
         let nodes = group.first_node..group.first_node + nodes;
         let blocks = group.first_block..group.first_block + blocks;
-        // SAFETY: the caller's promise; groups have nodes and blocks of their own. Nodes and blocks of lanes consist of nothing but lanes.
+        // SAFETY: the caller's promise; groups have nodes and blocks of their own. Nodes and blocks of lanes consist of
+        // nothing but lanes.
         unsafe {
             SystemFactors {
                 nodes: as_lanes(&self.wide_nodes, nodes),
@@ -222,7 +223,7 @@ unsafe fn as_lanes<'a, T>(numbers: &Shared<'a, Wide>, range: Range<usize>) -> &'
 
 /// A pass over groups of systems.
 pub(super) struct SystemWork<'a> {
-    /// Whether the pass sets systems up, in place of solving them.
+    /// Whether the pass sets systems up instead of solving them.
     pub begins: bool,
     pub problem: &'a StepProblem,
     pub layout: &'a SystemLayout,
@@ -266,7 +267,7 @@ impl SystemWork<'_> {
 
     /// The number in the row of a node of the problem, among corrections or impulses.
     ///
-    /// SAFETY: `check` holds that a joint is in one system, and tasks have different systems.
+    /// SAFETY: `check` guarantees that a joint is in one system, and tasks have different systems.
     #[inline(always)]
     fn number<'c>(&self, rows: &SharedImpulses<'c>, node: usize, row: usize) -> &'c mut f32 {
         let ImpulsePlace { row: at, lane } = self.layout.of_nodes[node][row];
@@ -302,7 +303,7 @@ impl SystemRows<f32> for Alone<'_, '_> {
         let row = &problem.joints[problem.systems.nodes[self.node(node)].joint as usize];
         let [(a, mass_a), (b, mass_b)] = [row.body_a, row.body_b].map(|body| {
             let slot = self.work.slots[body as usize] as usize;
-            // SAFETY: a system that begins writes no body, and no other pass runs beside it.
+            // SAFETY: a system that is being set up writes no body, and no other pass runs at the same time.
             let state = unsafe { &*self.work.bodies.slice(slot..slot + 1).as_ptr() };
             let [xx, xy, xz, inv_mass, yy, yz, zz, _] = state.mass.0;
             let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
@@ -380,7 +381,8 @@ impl<L: Lanes> SystemRows<L> for SideBySide<'_, '_> {
         let a = lanes!(lane => place(slots[rows[lane].body_a as usize] as usize));
         let b = lanes!(lane => place(slots[rows[lane].body_b as usize] as usize));
         let states = bodies.as_ptr();
-        // SAFETY: the places are those of states. A system that begins writes no body, and no other pass runs beside it.
+        // SAFETY: the places are those of states. A system that is being set up writes no body, and no other pass runs
+        // at the same time.
         let (a, b, mass_a, mass_b) =
             unsafe { (wide_body(states, &a), wide_body(states, &b), wide_mass(states, &a), wide_mass(states, &b)) };
         // No velocity is read.

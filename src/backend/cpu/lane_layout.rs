@@ -22,7 +22,6 @@ use crate::problem::StepProblem;
 pub(super) struct ImpulsePlace {
     /// The index of its sixteen impulses.
     pub row: u32,
-    /// Its lane.
     pub lane: u32,
 }
 
@@ -203,7 +202,8 @@ impl<C: Constraint> LaneLayout<C> {
                     if lane == 0 {
                         (open[kind], next) = (next, next + 1);
                     }
-                    // SAFETY: the groups of a cell begin where those of the cell before end, and tasks have different cells.
+                    // SAFETY: the groups of a cell begin where those of the cell before end, and tasks have different
+                    // cells.
                     let group = unsafe { &mut groups.slice(open[kind]..open[kind] + 1)[0] };
                     if lane == 0 {
                         (group.first, group.count) = (next_impulse, kind as u32 + 1 + patch);

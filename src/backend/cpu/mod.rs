@@ -61,7 +61,7 @@ pub struct Cpu {
     bodies: Vec<State>,
     free: Vec<Row8>,
     accelerations: Vec<Row8>,
-    /// Rows of damping; none where no body is damped.
+    /// Rows of damping; empty if no body is damped.
     dampings: Vec<Row8>,
     /// Unequal moments of inertia, and the slots of their bodies, in the order of slots.
     inertias: Vec<(usize, Inertia<f32>)>,

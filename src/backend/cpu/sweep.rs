@@ -46,8 +46,9 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
     #[inline(always)]
     fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &LaneGroup) {
         let states = self.bodies.as_ptr();
-        // SAFETY: `Load::take_bodies` looked up the slot of every lane. A body that can move occurs once in a color (`CheckedStep`
-        // holds that), so that no other task of this color reads or writes it; no task writes a body that cannot move.
+        // SAFETY: `Load::take_bodies` looked up the slot of every lane. `CheckedStep` guarantees that a movable body
+        // occurs once in a color, so no other task of this color reads or writes it. No task writes a body that cannot
+        // move.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
         if self.kernel.is_from_start() {
             let free = self.free.as_ptr();
@@ -104,7 +105,7 @@ impl Work for Sums<'_> {
     #[inline(always)]
     fn over<L: Lanes>(&self, range: Range<usize>) {
         let count = range.len();
-        // SAFETY: tasks have different ranges, and no pass runs beside this one.
+        // SAFETY: tasks have different ranges, and no pass runs at the same time.
         let (impulses, mut totals) = unsafe { (self.impulses.slice(range.clone()), self.totals.slice(range)) };
         for k in 0..count {
             let (now, mut total): (Impulse<L>, Impulse<L>) = (impulses.impulse(k), totals.impulse(k));

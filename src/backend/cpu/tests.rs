@@ -1,4 +1,4 @@
-//! Threads share the memory of a step. These tests also run in Miri, which sees races; lanes are then portable.
+//! Threads share the memory of a step. Miri also runs these tests, with portable lanes, and reports races.
 
 use super::super::calibrate::pile;
 use super::{Cpu, Reference};
@@ -7,8 +7,8 @@ use crate::config::SolverConfig;
 use crate::plan::StepPlan;
 use crate::problem::{JointRow, StepProblem};
 
-/// Bodies of a pile that move against each other: two colors of its contacts, and as many joints as the last has contacts. Each color
-/// is wide enough for two threads.
+/// Bodies of a pile in relative motion, with two colors of its contacts, and as many joints as the last color has
+/// contacts. Each color has enough constraints for two threads.
 fn moving_pile() -> StepProblem {
     let mut problem = pile(if cfg!(miri) { 4 } else { 7 });
     let starts = problem.colors.clone();

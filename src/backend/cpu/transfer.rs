@@ -135,8 +135,8 @@ impl<C: Constraint> Work for Store<'_, C> {
                 for (lane, &row) in group.rows.iter().enumerate().filter(|r| *r.1 != NO_ROW) {
                     for (k, i) in own.clone().enumerate() {
                         let numbers = self.impulses.numbers(i).map(|number| number.0[lane]);
-                        // SAFETY: `LaneLayout::make_groups` puts each constraint into one lane of one group, and `CheckedStep` holds that
-                        // constraints have different impulses.
+                        // SAFETY: `LaneLayout::make_groups` puts each constraint into one lane of one group, and
+                        // `CheckedStep` guarantees that constraints have different impulses.
                         unsafe { self.write(C::impulse(self.rows, row, k), &numbers) };
                     }
                 }
@@ -198,7 +198,6 @@ fn first_eight<L: Lanes>(rows: &[&[f32]; WIDTH]) -> [Wide; 8] {
     stored(unsafe { L::columns(&addresses) })
 }
 
-/// The last eight.
 #[inline(always)]
 fn last_eight<L: Lanes>(rows: &[&[f32]; WIDTH]) -> [Wide; 8] {
     let addresses = lanes!(lane => rows[lane][rows[lane].len() - 8..].as_ptr());

@@ -105,7 +105,7 @@ pub(super) async fn find(choice: AdapterChoice, name: &str) -> Result<(wgpu::Ada
             _ => format!("one that {name:?} and {variable} name, for "),
         };
         Error::Adapter(if cfg!(target_family = "wasm") {
-            "no adapter found: this browser offers no WebGPU here".into()
+            "no adapter found: this browser does not offer WebGPU to this page".into()
         } else {
             format!("no adapter found; looked for {named}Vulkan, Metal, Direct3D 12 and OpenGL drivers: {INSTALL}")
         })

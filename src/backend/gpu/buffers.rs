@@ -65,7 +65,6 @@ impl Buffers {
         }
     }
 
-    /// The buffer of a binding.
     pub fn get(&self, binding: Binding) -> &wgpu::Buffer {
         self.slots[binding as usize].buffer.as_ref().expect("every buffer is made before a kernel is bound")
     }
@@ -233,7 +232,7 @@ impl Buffers {
         let all = self.slots.iter().filter_map(|slot| slot.buffer.as_ref()).chain(&self.staging);
         let is_full = all.map(wgpu::Buffer::size).sum::<u64>() + size > self.memory;
         let (size, adapter) = (SizeText(size), &self.adapter);
-        let refusal = Error::TooLarge(format!("{adapter} has no {size} of memory for the {name}: use --backend cpu"));
+        let refusal = Error::TooLarge(format!("{adapter} cannot allocate {size} for the {name}: use --backend cpu"));
         if is_full {
             return Err(refusal);
         }

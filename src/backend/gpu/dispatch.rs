@@ -10,7 +10,6 @@ use crate::kernels::momentum::IMPULSES_PER_CHUNK;
 use crate::plan::{Kernel, Pass};
 use crate::problem::{PassRow, StepProblem};
 
-/// One dispatch.
 pub(super) struct Dispatch {
     pub program: Program,
     /// Number of rows that its threads divide among them.

@@ -25,8 +25,8 @@ impl KeptPipelines {
         let file = folder.join(wgpu::util::pipeline_cache_key(&device.adapter_info())?);
         let kept = std::fs::read(&file).unwrap_or_default();
         let descriptor = wgpu::PipelineCacheDescriptor { label: Some("drystone"), data: whole(&kept), fallback: true };
-        // SAFETY: the data must be what a cache of this kind gave. `write` wrote it so, and the hash says that nothing changed it since;
-        // wgpu compares adapter, driver and version, and begins anew where they differ.
+        // SAFETY: the data must come from a cache of this kind. `write` wrote it, and the hash shows that it is
+        // unchanged. wgpu compares adapter, driver and version, and starts with an empty cache if they differ.
         let cache = unsafe { device.create_pipeline_cache(&descriptor) };
         Some(Self { cache, file })
     }

@@ -22,8 +22,8 @@ pub struct GpuOptions {
     pub name: String,
     /// Exact mode: no driver can reassociate or fuse arithmetic, so that results equal the reference to the last bit.
     /// If the adapter accepts SPIR-V, its shaders carry a decoration that forbids both. Otherwise integers guard the
-    /// sums and products of the WGSL. That has kept the bits on every tested adapter; `drystone-conform` tests
-    /// this one.
+    /// sums and products of the WGSL. That has kept the bits on every tested adapter; `drystone-conform` tests the
+    /// adapter of a machine.
     pub exact: bool,
     /// Whether exact mode uses the guarded WGSL even if the adapter accepts SPIR-V.
     pub steered: bool,

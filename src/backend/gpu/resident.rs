@@ -146,7 +146,7 @@ pub(super) async fn begin(
 /// Sends the recomputed manifolds; the device computes their rows.
 fn send_written(buffers: &mut Buffers, problem: &StepProblem, carry: &Carry) -> Result<()> {
     if carry.written.iter().any(|written| written.row as usize >= problem.contacts.len()) {
-        return Err(Error::input("contacts written again: a row that is not there"));
+        return Err(Error::input("contacts written again: a row does not exist"));
     }
     let (mut contacts, mut arms) = (Vec::with_capacity(carry.written.len()), Vec::new());
     for written in &carry.written {

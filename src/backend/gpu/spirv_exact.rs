@@ -1,9 +1,9 @@
 //! Exact mode in SPIR-V: every sum and product has to be computed as written.
 //!
 //! Plain WGSL allows drivers to reassociate and to fuse. Software Vulkan turns `v + (x y - z w)` into `(v + x y) - z
-//! w`, and after four sweeps nearly every body differs in its last bits. With `NoContraction` on every arithmetic
-//! result it does not, at the same speed, and the GPU agrees with the reference to the last bit. Naga does not write
-//! this decoration, so this module adds it to naga's output.
+//! w`, and after four sweeps nearly every body differs in its last bits. The decoration `NoContraction` on every
+//! arithmetic result prevents this at the same speed, and the GPU agrees with the reference to the last bit. Naga does
+//! not write it, so this module adds it to naga's output.
 
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
@@ -44,9 +44,9 @@ fn without_contraction(words: &[u32]) -> Vec<u32> {
 }
 
 /// SPIR-V in which no result can be reassociated or fused, and no index leaves its buffer: naga takes the smaller of an
-/// index and the last index of the buffer. The shaders that wgpu compiles do the same, unless the driver does. On the
-/// software adapter, `solve_contacts` takes 1.01 times as long with these checks (pile of 2,000 and wall, 20 pairs of
-/// runs in turn).
+/// index and the last index of the buffer. wgpu does the same to the shaders that it compiles, unless the driver checks
+/// indices itself. On the software adapter, `solve_contacts` takes 1.01 times as long with these checks (pile of 2,000
+/// and wall, 20 pairs of runs in turn).
 ///
 /// # Errors
 /// Naga cannot write it.
@@ -87,11 +87,12 @@ pub(super) fn shader_module(device: &wgpu::Device, reflected: &Reflected) -> Res
         spirv: Some(spirv.into()),
         ..Default::default()
     };
-    // SAFETY: the driver takes these words unseen, so that they must be valid and their indices must stay inside the buffers that
-    // are bound. They are valid: naga wrote them from a module that it validated, and `without_contraction` adds decorations only.
-    // Indices stay inside: those of a problem's rows and a pass's colors name rows that are there, which `CheckedStep` keeps; and
-    // `exact_spirv` lets naga bound every index by the length of its buffer, whatever the rows say, which
-    // `tests/cpu/shaders.rs` keeps. `Pipelines::prepare` makes the layout of the bindings from the same module.
+    // SAFETY: the driver does not check these words, so they must be valid, and their indices must stay inside the
+    // bound buffers. They are valid: naga wrote them from a module that it validated, and `without_contraction` only
+    // adds decorations. Indices stay inside: `CheckedStep` guarantees that the indices in a problem's rows and in a
+    // pass's colors name existing rows, and `exact_spirv` lets naga limit every index to the length of its buffer for
+    // any rows (test: `tests/cpu/shaders.rs`). `Pipelines::prepare` makes the layout of the bindings from the same
+    // module.
     Ok(unsafe { device.create_shader_module_passthrough(descriptor) })
 }
 

@@ -1,6 +1,6 @@
-//! The contacts of cuboids, sixteen pairs at a time, bit for bit equal to parry's `contact_manifold_cuboid_cuboid` for
-//! each pair, if parry sees the pair enlarged by 2^17 or more: beside so large a pair its tolerances, which are absolute
-//! lengths, are nothing.
+//! Computes the contacts of cuboids, sixteen pairs at a time. Each contact has the bits of parry's
+//! `contact_manifold_cuboid_cuboid` for the same pair enlarged by 2^17 or more. Parry's tolerances are absolute
+//! lengths, and have no effect on a pair of that size.
 //!
 //! Parry tests the three face normals of each cuboid and the nine cross products of edges, and takes the direction
 //! along which the cuboids are furthest apart. Then it clips the two faces that are most perpendicular to that
@@ -25,7 +25,6 @@ use crate::lanes::{InstructionSet, Row8, WIDTH};
 /// Two cuboids to test.
 #[derive(Clone, Copy)]
 pub(super) struct CuboidPair {
-    /// The bodies.
     pub bodies: [u32; 2],
     /// Indices in the list of cuboids.
     pub cuboids: [u32; 2],

@@ -1,4 +1,4 @@
-//! Contacts of cuboids against parry's, bit by bit.
+//! Compares contacts of cuboids with parry's, bit by bit.
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;
@@ -10,7 +10,7 @@ use super::*;
 use crate::collide::testing::Random;
 
 impl Random {
-    /// One of a few angles, and a tiny one.
+    /// A rotation by quarter turns, mostly with a tiny rotation in addition.
     fn nearly_right(&mut self) -> Quat {
         let quarter = |x: f32| (3.0 * x) as i32 as f32 * std::f32::consts::FRAC_PI_2;
         let right = Vec3::new(self.next(), self.next(), self.next()).to_array().map(quarter);
@@ -24,8 +24,8 @@ impl Random {
     }
 }
 
-/// Two cuboids about as far apart as they touch. Some have the same size, or sizes and distances that are round numbers, so that directions
-/// are as good as others and corners lie on sides.
+/// Two cuboids at about the distance at which they touch. Some have equal sizes, or sizes and distances that are round
+/// numbers, so that several directions are equally good and corners lie on sides.
 fn two(random: &mut Random, nearly_parallel: bool) -> ([BodyState; 2], [CuboidPlace; 2]) {
     let size = |random: &mut Random| {
         let any = Vec3::splat(1.05) + random.vector();
@@ -53,8 +53,8 @@ fn two(random: &mut Random, nearly_parallel: bool) -> ([BodyState; 2], [CuboidPl
     (bodies, places)
 }
 
-/// Compares `count` pairs with parry, bit by bit; returns how many touch. They are `smaller`, a power of two, than those of [`two`]; parry
-/// sees each so large that its tolerances are nothing beside it.
+/// Compares `count` pairs with parry, bit by bit, and returns how many touch. The pairs are those of [`two`], made
+/// smaller by the power of two `smaller`. Parry gets each pair enlarged until its tolerances have no effect.
 fn compare(set: InstructionSet, count: u32, nearly_parallel: bool, smaller: f32) -> usize {
     let mut random = Random(if nearly_parallel { 1 << 40 } else { 1 << 41 });
     let (mut scratch, mut touching, mut points) = (CuboidScratch::default(), 0, 0);
@@ -80,7 +80,7 @@ fn compare(set: InstructionSet, count: u32, nearly_parallel: bool, smaller: f32)
         });
         for pair in &pairs {
             let [a, b] = pair.bodies.map(|i| i as usize);
-            // Parry puts this length in place of a distance of zero.
+            // Parry uses this length in place of a distance of zero.
             let larger = f32::EPSILON / cuboids[a].least.min(cuboids[b].least);
             let pose = |i: usize| {
                 let body = Pose::from_parts(larger * bodies[i].position, bodies[i].rotation);
@@ -144,8 +144,9 @@ fn small_cuboids_touch_as_parry_says_of_large_ones_bit_by_bit() {
     }
 }
 
-/// A million pairs of either kind: `cargo test --release --lib collide::cuboids -- --ignored`. Without `--release` parry itself stops at one
-/// of the nearly parallel pairs: it asserts in debug builds that a distance between two faces is not negative, and rounding makes it so.
+/// A million pairs of either kind: `cargo test --release --lib collide::cuboids -- --ignored`. Without `--release`
+/// parry stops at one of the nearly parallel pairs: a debug assertion requires that a distance between two faces is not
+/// negative, and rounding makes it negative.
 #[test]
 #[ignore = "half a minute"]
 fn a_million_cuboids_touch_as_parry_says_bit_by_bit() {

@@ -1,8 +1,9 @@
 //! The rows of contacts as bytes.
 //!
-//! Slots follow from the manifolds that have them, and rows from manifolds, materials and masses. Only what may have changed since they were
-//! written is saved as it is: effective masses of bodies with unequal moments, which turned, most of all. Builds for tests write the other
-//! rows again when they are saved, too, and compare all bits. What is left are impulses, preloads, and how deep contacts sag and sagged.
+//! The slots follow from the manifolds, and the rows from manifolds, materials and masses. A row is saved as it is only
+//! if these may have changed since it was written. In most cases only the effective masses have changed, of bodies with
+//! unequal moments that turned. Builds for tests also write the other rows again when they save, and compare all bits.
+//! The rest of the saved state is impulses, preloads, sags and needs.
 
 mod loads;
 mod slots;
@@ -27,7 +28,7 @@ use crate::world::{Body, BodyKind, Surface, World};
 use loads::{COLUMNS, Rows, SlotLoads, Sources};
 use slots::walk_slots;
 
-/// The rows of neighboring slots, in memory of their own.
+/// The rows of neighboring slots, in their own memory.
 struct Buffers {
     contacts: Vec<ContactRow>,
     points: Vec<PointRow>,
@@ -56,8 +57,8 @@ impl Buffers {
 }
 
 impl ContactRows {
-    /// Writes all that lasts with the rows of contacts of the problem, or reads it. The slots are those of the manifolds of the detector; the
-    /// settings are those that the rows were written for.
+    /// Writes the lasting state of the rows of contacts of the problem, or reads it. The slots are those of the
+    /// manifolds of the detector. The settings are those at the time when the rows were written.
     pub(crate) fn walk<A: Archive>(
         &mut self,
         world: &World,
@@ -171,7 +172,7 @@ impl ContactRows {
                 };
                 let turns = |&body: &usize| masses[body].inv_mass > 0.0 && !has_equal_moments(&world.bodies[body]);
                 match all_there && bodies.iter().any(turns) {
-                    // Rows of contacts that rest are written again before they are swept.
+                    // Rows of contacts at rest are written again before they are swept.
                     _ if !slot.takes_part && all_there => Rows::Remade,
                     _ if slot.write != Write::Separations || !all_there || !bodies.iter().all(is_same) => Rows::All,
                     true => Rows::Masses,
@@ -261,7 +262,7 @@ impl ContactRows {
 }
 
 impl Buffers {
-    /// How a slot is to be written, for its rows as they are.
+    /// How a slot is to be saved, given its present rows.
     fn rows(
         &self,
         i: usize,
@@ -272,7 +273,8 @@ impl Buffers {
         let patch = points.len() - MAX_POINTS;
         let count = contact.point_count as usize + patch;
         let own = points[..count].iter().zip(&self.points[i * points.len()..]);
-        // How far apart surfaces are, and their velocities, every step writes anew; and where friction has the direction of the slip, all of it.
+        // Every step writes separations and approach velocities anew, and with slip friction also slips and tangential
+        // masses.
         let slip = |point: &PointRow| if slips { [0; 2] } else { [point.slip_1, point.slip_2].map(f32::to_bits) };
         let arms = |point: &PointRow| ([point.r_a, point.r_b].map(|r| r.map(f32::to_bits)), slip(point));
         let masses =
@@ -288,13 +290,13 @@ impl Buffers {
     }
 }
 
-/// Whether no rotation changes the inverse inertia of a body.
+/// Whether a body has the same inverse inertia in every rotation.
 fn has_equal_moments(body: &Body) -> bool {
     let moments = body.mass.principal_inertia;
     moments.x == moments.y && moments.y == moments.z
 }
 
-/// Writes what is most of the time as `usual` makes it, or reads it.
+/// Writes a value, or reads it. A value equal to `usual` takes a flag only.
 fn walk_same<T: Saved + PartialEq, A: Archive>(
     value: &mut T,
     usual: impl FnOnce() -> T,

@@ -45,7 +45,7 @@ fn a_wrong_body_that_came_or_changed_is_refused_in_one_line() {
             w.bodies[3].colliders[0].shape = Shape::cuboid(0.5, -1.0, 0.5);
         }),
         ("body 0 \"\": mass", |w| w.bodies[0].kind = drystone::BodyKind::Dynamic),
-        ("joint 5: names body 5, which is gone", |w| {
+        ("joint 5: names body 5, which was removed", |w| {
             w.joints[0].body_a = 5.into();
             w.remove(w.bodies.handle(5).expect("a body"));
             w.join(Joint::to_world(4, Vec3::ZERO, Vec3::ZERO));
@@ -91,7 +91,7 @@ fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
     let cases: [(&str, Change); 6] = [
         ("gravity", |w| w.gravity.y = f32::NAN),
         ("joint 0: names body 99, beyond the last of ", |w| w.joints[0].body_b = Some(99.into())),
-        ("joint 0: ties body 1 to itself", |w| w.joints[0] = Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
+        ("joint 0: connects body 1 to itself", |w| w.joints[0] = Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
         ("joint 0: its anchors", |w| w.joints[0].anchor_b.x = f32::NAN),
         ("body 2 \"\": mass", |w| w.bodies[2].mass.mass = -1.0),
         ("body 2 \"\": friction", |w| w.bodies[2].material.friction = f32::NAN),

@@ -7,11 +7,11 @@ use drystone::{Error, Result};
 pub enum Change {
     /// The earlier bench has no such row.
     New,
-    /// The scene has other contents; the times cannot be compared.
+    /// The scene has other content, so the times cannot be compared.
     OtherScene,
-    /// Another machine measured the earlier bench; the times cannot be compared.
+    /// The earlier bench ran on another machine, so the times cannot be compared.
     OtherMachine,
-    /// Ratio of the new time to the earlier one; within the spread of both.
+    /// Ratio of the new time to the earlier one. The difference is within the spread of both.
     Same(f64),
     /// The lower quartile is above the earlier upper one.
     Slower(f64),
@@ -77,7 +77,7 @@ mod tests {
         then.rows[0].hash = "0".repeat(16);
         then.rows[1].threads = 7;
         assert_eq!(compare_with(&now, &then), [Change::OtherScene, Change::New]);
-        // Another build of the same machine is what a baseline is for.
+        // A baseline is meant for another build on the same machine.
         let mut then = now.clone();
         then.machine.build = "0.0.1 release".into();
         assert_eq!(compare_with(&now, &then), [Change::Same(1.0); 2]);

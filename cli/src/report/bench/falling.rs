@@ -1,4 +1,4 @@
-//! Scenes from their first step on: times of the stages in each third of the run.
+//! Measures scenes from their first step: times of the stages in each third of the run.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,8 +14,9 @@ use drystone_scenes::{Scene, Spawners};
 pub const FALLING: [&str; 3] = ["pyramid:base=100", "pile:n=5120", "pile:n=20000"];
 pub const FALLING_QUICK: [&str; 2] = ["pyramid:base=20", "pile:n=1000"];
 
-/// Wall times of the stages of a step (ms) in one third of a run: medians over its steps, but for the first of the run. Errors are of
-/// the end of the third. [`comparison::WindowRow`](crate::report::comparison::WindowRow) compares engines, which have no stages.
+/// Wall times of the stages of a step (ms) in one third of a run: medians over its steps, without the first step of the
+/// run. Errors are those at the end of the third. [`comparison::WindowRow`](crate::report::comparison::WindowRow)
+/// compares engines, which do not report stages.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FallingRow {
     pub scene: String,
@@ -38,7 +39,7 @@ pub struct FallingRow {
     /// Sweeps and transfers.
     pub run: f64,
     pub store: f64,
-    /// Pairs of a step, those with manifolds computed anew, and manifolds: medians.
+    /// Medians per step: pairs, pairs with recomputed manifolds, and manifolds.
     pub pairs: f64,
     pub computed: f64,
     pub manifolds: f64,
@@ -60,8 +61,8 @@ struct Fall {
     ends: Vec<(Penetration, f64)>,
 }
 
-/// Runs the scenes `specs` for `steps` steps on each of the backends that `open` makes, with each number of `threads`. `after_turn` is
-/// called after each turn of ten steps of each of these.
+/// Runs the scenes `specs` for `steps` steps on each backend of `open`, with each number of `threads`. Calls
+/// `after_turn` after each turn of ten steps of each combination.
 pub fn falling(
     specs: &[String],
     config: &SolverConfig,
@@ -102,7 +103,7 @@ pub fn falling(
     Ok(falls.into_iter().flat_map(|fall| fall.rows(config)).collect())
 }
 
-/// Turns of a run of so many steps: at least one in each third.
+/// Number of turns of a run with this number of steps: at least one in each third.
 pub fn turns(steps: usize) -> usize {
     steps.div_ceil(TURN).max(3)
 }
@@ -177,7 +178,7 @@ mod tests {
             assert!(one.ms > 0.0 && one.ms_worst >= one.ms && one.ms_first > 0.0, "{one:?}");
             assert!(one.detect + one.color + one.prepare + one.run + one.store < 2.0 * one.ms, "{one:?}");
         }
-        // Boxes fall before they meet: speed is there first, contacts later.
+        // Boxes fall before they touch: first speeds grow, then contacts.
         assert!(rows[0].speed_rms > 1.0 && rows[0].manifolds < rows[2].manifolds, "{rows:?}");
     }
 }

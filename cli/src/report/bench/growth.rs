@@ -12,7 +12,7 @@ pub const GROWTH: [&str; 4] = ["pyramid:base=45", "pyramid:base=141", "pyramid:b
 
 /// Steps before the measurement.
 const SETTLE: usize = 5;
-/// Bodies stepped in a measurement, which has as many steps, but within [`STEPS`].
+/// Total number of body steps in a measurement. It determines the number of steps, within [`STEPS`].
 const BODY_STEPS: usize = 400_000;
 const STEPS: [usize; 2] = [6, 100];
 
@@ -25,7 +25,7 @@ pub struct GrowthRow {
     pub manifolds: usize,
     /// Passes over all contacts in a step: a warm start and the sweeps.
     pub passes: f64,
-    /// Least time of `run` for a manifold and pass (ns).
+    /// Least time of `run` per manifold and pass (ns).
     pub ns: f64,
     /// The same relative to the first scene.
     pub growth: f64,
@@ -35,12 +35,12 @@ pub struct GrowthRow {
     pub run: f64,
     pub store: f64,
     pub ms: f64,
-    /// Largest memory of the process while the scene is made and stepped, without what was there before, for each box; none where the
-    /// system does not say.
+    /// Peak memory of the process while the scene is built and stepped, minus the memory before, per box (B). `None` if
+    /// the system does not report it.
     pub bytes_a_box: Option<f64>,
 }
 
-/// Steps the scenes one after another with each number of `threads`. `after_scene` is called after each.
+/// Steps the scenes in turn with each number of `threads`. Calls `after_scene` after each scene.
 pub fn growth(specs: &[String], threads: &[usize], after_scene: &mut dyn FnMut()) -> Result<Vec<GrowthRow>> {
     let config = SolverConfig::default().without_sleep();
     let mut rows: Vec<GrowthRow> = Vec::new();
@@ -79,7 +79,8 @@ impl GrowthRow {
     }
 }
 
-/// A warm start, and the sweeps of a body on average: an island of class c takes 2^c times the substeps of the settings.
+/// Passes over the contacts in a step: a warm start, and the sweeps of an average body. An island of class c takes 2^c
+/// times the substeps of the settings.
 fn passes(config: &SolverConfig, stats: &StepStats) -> f64 {
     let awake: f64 = stats.efforts.iter().map(|&count| f64::from(count)).sum();
     let efforts: f64 = stats.efforts.iter().zip(0..).map(|(&count, class)| f64::from(count) * 2_f64.powi(class)).sum();
@@ -100,7 +101,7 @@ mod tests {
             [(55, 1), (55, 2), (1830, 1), (1830, 2)]
         );
         for row in &rows {
-            // Each box but those of the lowest row stands on two others: n(n-1) manifolds, and n on the ground.
+            // Each box above the lowest row stands on two others: n(n-1) manifolds, and n on the ground.
             let base = if row.boxes == 55 { 10 } else { 60 };
             assert_eq!((row.manifolds, row.passes), (base * base, 17.0));
             let of_run = row.ns * 1e-6 * row.manifolds as f64 * row.passes;
@@ -119,7 +120,7 @@ mod tests {
         let mut stats = StepStats::default();
         assert_eq!(passes(&config, &stats), 17.0);
         (stats.efforts[0], stats.efforts[2]) = (30, 10);
-        // Thirty boxes take 16 sweeps, ten take 64.
+        // Thirty boxes take 16 sweeps and ten take 64.
         assert_eq!(passes(&config, &stats), 1.0 + (30.0 * 16.0 + 10.0 * 64.0) / 40.0);
     }
 }

@@ -1,4 +1,4 @@
-//! Sweeps compared with the limits of memory and arithmetic, measured in the same turns.
+//! Compares sweeps with the limits of memory and arithmetic, measured in the same turns.
 
 use std::time::Instant;
 
@@ -12,16 +12,17 @@ use super::rates::{peak, triad};
 use super::settled;
 use crate::report::rounds::interleave;
 
-/// A pile whose contacts stay in the cache of a core, one whose contacts stay in a shared cache, and a pyramid of 500,500 boxes, whose
-/// contacts come from memory.
+/// A pile with contacts that fit into the cache of a core, a pile with contacts that fit into a shared cache, and a
+/// pyramid of 500,500 boxes with contacts in memory.
 pub const LIMITS: [&str; 3] = ["pile:n=1000", "pile:n=20000", "pyramid:base=1000"];
 pub const LIMITS_QUICK: [&str; 2] = ["pile:n=1000", "pyramid:base=100"];
 
-/// Operations on single numbers per point and sweep of a contact of four points with friction, between bodies with equal moments of
-/// inertia: the mean, counted by a test.
+/// Mean number of scalar operations per point and sweep, for a contact of four points with friction between bodies with
+/// equal moments of inertia. A test counts them.
 pub const OPERATIONS: f64 = 249.5;
 
-/// A sweep over all contacts of a scene at rest. Rates are the best of all turns: disturbances only slow a turn down.
+/// A sweep over all contacts of a scene at rest. Rates are the best of all turns, because disturbances only slow a turn
+/// down.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LimitRow {
     pub scene: String,
@@ -29,22 +30,23 @@ pub struct LimitRow {
     pub boxes: usize,
     pub manifolds: usize,
     pub points: usize,
-    /// Time of a manifold (ns).
+    /// Time per manifold (ns).
     pub ns: f64,
     /// Contact points swept per second by all threads together.
     pub sweeps: f64,
-    /// Bytes of all that a sweep of the lanes reads or writes, each counted once.
+    /// Bytes of all data that a sweep of the lanes reads or writes, each counted once.
     pub held: usize,
-    /// Bytes of a manifold that a sweep of the lanes reads and writes, each body as often as a contact names it; and the same of the
-    /// kernels over plain rows.
+    /// Bytes per manifold that a sweep of the lanes reads and writes, with a body counted for each of its contacts;
+    /// then the same for the kernels over plain rows.
     pub lane_bytes: f64,
     pub kernel_bytes: f64,
-    /// Operations on single numbers a manifold.
+    /// Scalar operations per manifold.
     pub operations: f64,
-    /// Bytes per second of a = b + s c over three arrays of `held` bytes together, and the rate of `lane_bytes` relative to it.
+    /// Bytes per second of a = b + s c over three arrays of `held` bytes in total, and the rate of `lane_bytes`
+    /// relative to it.
     pub triad: f64,
     pub of_triad: f64,
-    /// Multiplications and additions per second on registers alone, and the rate of `operations` relative to it.
+    /// Multiplications and additions per second in registers alone, and the rate of `operations` relative to it.
     pub peak: f64,
     pub of_peak: f64,
 }
@@ -62,7 +64,8 @@ impl LimitRow {
     }
 }
 
-/// A scene with its problem, on one number of threads: the row so far and the least times of [`FEW`] and [`MANY`] sweeps.
+/// A scene with its problem and one number of threads: the row so far, and the least times of [`FEW`] and [`MANY`]
+/// sweeps.
 struct Limit<'a> {
     problem: &'a StepProblem,
     pool: rayon::ThreadPool,
@@ -103,7 +106,7 @@ pub fn limits(
     Ok(all.into_iter().map(swept).collect())
 }
 
-/// The next step of a scene at rest, and its boxes. A scene without a container begins at rest.
+/// The next step of a scene at rest, and its number of boxes. A scene without a container is at rest from the start.
 fn problem(spec: &str) -> Result<(usize, StepProblem)> {
     let config = SolverConfig::default().without_sleep();
     let scene = Scene::find_spec(spec)?;
@@ -143,13 +146,13 @@ fn count(problem: &StepProblem) -> Result<LimitRow> {
     })
 }
 
-/// Contacts that all sweeps of a plan go over together.
+/// Number of contacts that the sweeps of a plan visit in total.
 fn swept_contacts(problem: &StepProblem, plan: &StepPlan) -> usize {
     let sweeps = plan.passes.iter().filter(|pass| matches!(pass.kernel, Kernel::SolveContacts(_)));
     sweeps.map(|pass| problem.rows_of(&pass.colors).len()).sum()
 }
 
-/// So many biased sweeps in each substep of the problem.
+/// A plan with this number of biased sweeps in each substep of the problem.
 fn plan(problem: &StepProblem, sweeps: u32) -> StepPlan {
     let config = SolverConfig::default().without_sleep().with(|c| {
         c.iterations = sweeps;
@@ -158,7 +161,7 @@ fn plan(problem: &StepProblem, sweeps: u32) -> StepPlan {
     StepPlan::new(&config, problem)
 }
 
-/// The times of these two numbers of sweeps are subtracted, which cancels the work outside sweeps.
+/// Two numbers of sweeps. The difference of their times has no work outside of sweeps.
 const FEW: u32 = 1;
 const MANY: u32 = 4;
 
@@ -186,7 +189,7 @@ mod tests {
         assert_eq!(OPERATIONS, operations());
     }
 
-    /// Operations per point of one sweep of a contact of four points with friction, counted by the kernel.
+    /// Operations per point and sweep of a contact of four points with friction, counted in the kernel.
     fn operations() -> f64 {
         static COUNT: AtomicU64 = AtomicU64::new(0);
 
@@ -259,7 +262,7 @@ mod tests {
         (COUNT.load(Ordering::Relaxed) - before) as f64 / 4.0
     }
 
-    // The shares themselves depend on the load of the machine.
+    // The values of the shares depend on the load of the machine.
     #[test]
     fn every_limit_is_measured_for_every_scene_and_number_of_threads() {
         let specs = ["pile:n=200".to_owned(), "pyramid:base=10".to_owned()];
@@ -272,11 +275,12 @@ mod tests {
             assert!(row.ns > 0.0 && row.sweeps > 0.0 && row.of_peak > 0.0 && row.of_triad > 0.0, "{row:?}");
         }
         let pyramid = &rows[2];
-        // A plan has the substeps of its problem, eight here, whatever the settings say.
+        // A plan has the substeps of its problem, eight here, for any settings.
         let (_, problem) = problem("pyramid:base=10").expect("a scene");
         assert_eq!([1, 3].map(|n| swept_contacts(&problem, &plan(&problem, n))), [800, 2400]);
         assert_eq!((pyramid.manifolds, pyramid.points, pyramid.operations), (100, 400, 4.0 * OPERATIONS));
-        // Four points of 48 bytes and four impulses of 16, read and written; two bodies of 64 read at least, and their velocities written.
+        // Four points of 48 bytes, four impulses of 16 bytes, read and written, at least two bodies of 64 bytes read,
+        // and their velocities written.
         for row in &rows {
             let least = row.points as f64 / row.manifolds as f64 * 80.0 + 2.0 * 96.0;
             assert!(row.lane_bytes > least && row.lane_bytes < 4.0 * least, "{row:?}");
@@ -297,7 +301,7 @@ mod tests {
             peak: 4.8e9,
             ..LimitRow::default()
         };
-        // A million manifolds a second.
+        // A million manifolds per second.
         let row = row.with_shares(1e-3);
         assert_eq!((row.ns, row.sweeps, row.of_triad, row.of_peak), (1000.0, 4e6, 0.25, 0.25));
     }

@@ -1,12 +1,12 @@
-//! Memory of this process, as Linux tells it.
+//! Memory of this process, as reported by Linux.
 
-/// Bytes in memory now; the peak is counted anew from here on. None where the system does not say.
+/// Resets the peak, and returns the resident memory (B). `None` if the system does not report it.
 pub(super) fn begin() -> Option<f64> {
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     status("VmRSS:")
 }
 
-/// Most bytes in memory since [`begin`].
+/// Peak of the resident memory since [`begin`] (B).
 pub(super) fn peak() -> Option<f64> {
     status("VmHWM:")
 }

@@ -1,9 +1,10 @@
 //! `drystone bench`: times of the stages of a step, and errors, on standard scenes.
 //!
-//! All scenes are settled first. Then they take turns of a few steps, so that a slow phase of the machine affects all of them. A time
-//! is the median over the turns, its spread the quartiles. All backends and numbers of threads share one simulation of a scene, so that
-//! they do the same work. Other measurements have files of their own: scenes from their first step on (`falling`), one island of
-//! growing size (`growth`), many worlds (`worlds`), states that are kept (`states`), and sweeps against the limits of the machine (`limits`).
+//! All scenes are settled first. Then they take turns of a few steps, so that a slow phase of the machine affects all
+//! of them. A time is the median over the turns, and its spread is given by the quartiles. All backends and numbers of
+//! threads share one simulation of a scene, so that they do the same work. Other measurements have separate files:
+//! scenes from their first step on (`falling`), one island of growing size (`growth`), many worlds (`worlds`), saved
+//! states (`states`), and sweeps compared with the limits of the machine (`limits`).
 
 mod baseline;
 mod falling;
@@ -49,13 +50,14 @@ pub const STANDARD: [&str; 9] = [
 pub const QUICK: [&str; 5] = ["pile:n=1000", "many-pyramids:n=10", "drum", "joint-grid", "pile:n=100,worlds=8"];
 
 const TURN: usize = 10;
-/// Steps of one substep in which bodies fall into a container.
+/// Steps with one substep, in which bodies fall into a container.
 const COARSE: usize = 240;
 /// Steps with the measured settings before the measurement.
 const FINE: usize = 60;
 
-/// Wall times of the stages of a step (ms), counts and errors: one scene on one backend with one number of threads. Counts and errors
-/// are of the last step. [`comparison::Row`](crate::report::comparison::Row) compares engines, which have no stages.
+/// Wall times of the stages of a step (ms), counts and errors of one scene on one backend with one number of threads.
+/// Counts and errors are those of the last step. [`comparison::Row`](crate::report::comparison::Row) compares engines,
+/// which do not report stages.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StagesRow {
     pub scene: String,
@@ -87,7 +89,8 @@ pub struct StagesRow {
     pub penetration_mean: f64,
     /// Root mean square speed (m/s).
     pub speed_rms: f64,
-    /// [`e_vel`](drystone_problems::residuals::Residuals::e_vel) of the impulses after a substep in its contact problem without springs; none with joints.
+    /// [`e_vel`](drystone_problems::residuals::Residuals::e_vel) of the impulses after a substep, in its contact
+    /// problem without springs; `None` with joints.
     pub residual: Option<f64>,
 }
 
@@ -121,8 +124,8 @@ struct Case {
     last: StepStats,
 }
 
-/// Measures the scenes `specs` on each of the backends that `open` makes, with each number of `threads`. `after_turn` is called after
-/// each scene has settled and after each of its turns.
+/// Measures the scenes `specs` on each backend of `open`, with each number of `threads`. Calls `after_turn` after each
+/// scene has settled and after each of its turns.
 pub fn bench(
     specs: &[String],
     config: &SolverConfig,
@@ -152,8 +155,8 @@ pub fn bench(
     Ok(Bench { machine: Machine::this(), rows })
 }
 
-/// A simulation of a scene at rest, the hash of the scene and the length of its steps (s). Bodies fall into a container at one
-/// substep. Then preloads and warm starts settle at the measured settings.
+/// A simulation of a scene at rest, the hash of the scene and the length of its steps (s). Bodies fall into a container
+/// at one substep. Then preloads and warm starts settle at the measured settings.
 fn settled(spec: &str, config: &SolverConfig) -> Result<(Simulation, Spawners, String, f32)> {
     let scene = Scene::find_spec(spec)?;
     let (hash, dt, falls) = (content_hash(&scene), scene.dt, scene.container.is_some());

@@ -1,4 +1,4 @@
-//! What memory and arithmetic of the machine can do.
+//! Measures the memory bandwidth and the arithmetic rate of the machine.
 
 use std::hint::black_box;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use drystone::stages::backend::{InstructionSet, Lanes, WIDTH, Work};
 
-/// Multiplications and additions per second on registers alone, of all threads together.
+/// Multiplications and additions per second in registers alone, of all threads in total.
 pub(super) fn peak(pool: &rayon::ThreadPool) -> f64 {
     const ROUNDS: usize = 1_000_000;
     let begin = Instant::now();
@@ -16,10 +16,10 @@ pub(super) fn peak(pool: &rayon::ThreadPool) -> f64 {
     done as f64 / begin.elapsed().as_secs_f64()
 }
 
-/// Independent chains of each operation: enough for all units of a processor.
+/// Independent chains of each operation, enough for all units of a processor.
 const CHAINS: usize = 6;
 
-/// Multiplications and additions on registers alone, not fused, as in the kernels.
+/// Multiplications and additions in registers alone, not fused, as in the kernels.
 struct Chains;
 
 impl Work for Chains {
@@ -37,8 +37,8 @@ impl Work for Chains {
     }
 }
 
-/// Bytes per second of a = b + s c over three arrays, of all threads together, from the first start to the last end. Each thread has
-/// its own arrays, of `size` bytes together.
+/// Bytes per second of a = b + s c over three arrays, of all threads in total, from the first start to the last end.
+/// Each thread has its own arrays, of `size` bytes in total.
 pub(super) fn triad(pool: &rayon::ThreadPool, size: usize) -> f64 {
     let length = size / 12;
     let rounds = (64 << 20) / size + 2;

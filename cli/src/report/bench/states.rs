@@ -1,4 +1,4 @@
-//! What it takes to keep a state and to go back to it, beside a step.
+//! Measures the cost of keeping a state and going back to it, compared with a step.
 
 use std::time::Instant;
 
@@ -8,28 +8,28 @@ use super::{column, pool, settled};
 use drystone::stats::median;
 use drystone::{Cpu, Result, Simulation, SolverConfig};
 
-/// Scenes of the measurement. The last one is left out of a short one.
+/// Scenes of the measurement. A short measurement leaves out the last one.
 pub const STATES: [&str; 2] = ["pile:n=1000", "pile:n=20000"];
 
-/// A scene at rest and awake, on some threads. Times are medians over the rounds (ms).
+/// A scene at rest and awake, with one number of threads. Times are medians over the rounds (ms).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatesRow {
     pub scene: String,
     pub threads: usize,
     pub bodies: usize,
-    /// A step.
+    /// Time of a step.
     pub ms: f64,
-    /// [`Simulation::snapshot_into`] memory that stands.
+    /// Time of [`Simulation::snapshot_into`] allocated memory.
     pub snapshot: f64,
     pub restore: f64,
     pub save: f64,
     pub load: f64,
-    /// Bytes of a saved state over the number of dynamic bodies.
+    /// Bytes of a saved state divided by the number of dynamic bodies.
     pub bytes_a_body: f64,
 }
 
-/// Measures the scenes `specs` with each number of `threads`, `rounds` times in turns: a step, then a state into memory, back, into bytes and
-/// from them. `after_round` is called after each round of a scene with one number of threads.
+/// Measures the scenes `specs` with each number of `threads`, in `rounds` rounds: a step, a snapshot, a restore, a save
+/// and a load. Calls `after_round` after each round of a scene with one number of threads.
 pub fn states(
     specs: &[String],
     threads: &[usize],
@@ -70,7 +70,7 @@ pub fn states(
 
 /// The times of a round (ms), and the length of a saved state.
 fn round(simulation: &mut Simulation, dt: f32) -> Result<([f64; 5], usize)> {
-    // Memory that stands.
+    // Memory that is already allocated.
     let mut state = simulation.snapshot();
     let (stepped, step) = timed(|| simulation.step(dt));
     stepped?;
@@ -82,7 +82,7 @@ fn round(simulation: &mut Simulation, dt: f32) -> Result<([f64; 5], usize)> {
     Ok(([step, snapshot, restore, save, load], bytes.len()))
 }
 
-/// What a call gives, and its wall time (ms).
+/// The result of a call, and its wall time (ms).
 fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
     let begin = Instant::now();
     let given = call();
@@ -101,7 +101,7 @@ mod tests {
         for row in rows {
             let StatesRow { bodies, ms, snapshot, restore, save, load, bytes_a_body, .. } = row;
             assert!(bodies == 27 && [ms, snapshot, restore, save, load].iter().all(|&time| time > 0.0));
-            // A pose and a velocity alone have 13 numbers.
+            // A pose and a velocity alone are 13 numbers.
             assert!((52.0..2000.0).contains(&bytes_a_body), "{bytes_a_body} B");
         }
     }

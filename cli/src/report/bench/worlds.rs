@@ -1,4 +1,4 @@
-//! Worlds a second, over numbers of worlds.
+//! Measures world steps per second for several numbers of worlds.
 
 use std::time::Instant;
 
@@ -11,9 +11,9 @@ use drystone::{Cpu, Result, Simulation, SolverConfig};
 pub const WORLDS: [&str; 2] = ["tower", "pile:n=100"];
 pub const COUNTS: [usize; 5] = [1, 16, 256, 1024, 4096];
 
-/// Steps before the measurement: impulses begin at zero in each world.
+/// Steps before the measurement, because impulses start at zero in each world.
 const SETTLE: usize = 10;
-/// Least steps of a measurement, and its least time (s).
+/// Smallest number of steps of a measurement, and its shortest duration (s).
 const STEPS: usize = 8;
 const SECONDS: f64 = 0.3;
 
@@ -25,13 +25,13 @@ pub struct WorldsRow {
     pub bodies: usize,
     /// Median wall time of a step of all worlds (ms).
     pub ms: f64,
-    /// Steps of one world in a second.
+    /// Steps of single worlds per second.
     pub per_second: f64,
     /// The same relative to the best number of worlds.
     pub of_best: f64,
 }
 
-/// Steps 1, 16, ... worlds of each scene, all at rest. `after_count` is called after each number of worlds.
+/// Steps each number of worlds of each scene, all at rest. Calls `after_count` after each number of worlds.
 pub fn worlds(
     specs: &[String],
     counts: &[usize],

@@ -6,11 +6,11 @@ use drystone::config::{Friction, Method};
 use drystone::{Result, Simulation, SolverConfig, World};
 use drystone_scenes::{Scene, Spawners};
 
-/// An engine with its settings, stepping one scene.
+/// An engine with its settings, which steps one scene.
 pub trait Contender {
     fn setting(&self) -> Setting;
 
-    /// Makes one step of the scene's length; only this call is timed.
+    /// Makes one step of the scene's length. Only this call is timed.
     fn step(&mut self) -> Result<()>;
 
     /// The bodies of the scene after the last step, in their order.
@@ -25,7 +25,7 @@ pub type Team<'a> = dyn Fn(&Scene, Extent) -> Result<Vec<Box<dyn Contender>>> + 
 pub enum Extent {
     /// Few small scenes with few settings.
     Quick,
-    /// All kinds of scenes, of at most 1,000 bodies, with the settings that bear on equal error.
+    /// All kinds of scenes with at most 1,000 bodies, with the settings that matter at equal error.
     Brief,
     Full,
 }
@@ -48,7 +48,7 @@ impl Setting {
     pub fn drystone(backend: &str, config: &SolverConfig) -> Self {
         let mut more =
             settings::unusual(config, &["substeps", "iterations", "method", "friction", "sleep_after", "relax"]);
-        // The usual number of relax sweeps is that of the biased ones.
+        // By default the number of relax sweeps equals that of the biased sweeps.
         more.extend((config.relax != config.iterations).then(|| format!("relax={}", config.relax)));
         Self {
             engine: "drystone".into(),

@@ -1,4 +1,4 @@
-//! drystone against the other engines at equal error, as Markdown.
+//! Compares drystone with the other engines at equal error, as Markdown.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -11,11 +11,12 @@ use drystone::Result;
 /// The engine that is compared with all others.
 pub(super) const OWN: &str = "drystone";
 
-/// A row of another engine that is ahead: faster than every own row with an error no larger than its own.
+/// A row of another engine that is ahead: it is faster than every own row with an error that is not larger.
 struct Lead<'a> {
     row: &'a Row,
     fault: Fault,
-    /// Time of the fastest own row with an error no larger, relative to that of the row; infinite if no own row reaches the error.
+    /// Time of the fastest own row with an error that is not larger, relative to the time of this row; infinite if no
+    /// own row reaches the error.
     ratio: f64,
     /// Whether the quartiles of both times overlap.
     unsure: bool,
@@ -28,7 +29,7 @@ impl Lead<'_> {
     }
 }
 
-/// The rows of a scene that are ahead, by error and then as in `rows`.
+/// The rows of a scene that are ahead, sorted by error, then in the order of `rows`.
 fn leads(rows: &[Row]) -> Result<Vec<Lead<'_>>> {
     let (own, others): (Vec<_>, Vec<_>) =
         rows.iter().filter(|row| row.backend != "gpu").partition(|row| row.engine == OWN);
@@ -48,7 +49,7 @@ fn leads(rows: &[Row]) -> Result<Vec<Lead<'_>>> {
     Ok(leads)
 }
 
-/// The page; an element of `results` holds the rows of one scene. None without another engine.
+/// The page. Each element of `results` has the rows of one scene. `None` without another engine.
 pub fn page(results: &[Vec<Row>]) -> Result<Option<String>> {
     let others: BTreeSet<_> = results.iter().flatten().map(|row| &*row.engine).filter(|&name| name != OWN).collect();
     if others.is_empty() {
@@ -72,7 +73,8 @@ pub fn page(results: &[Vec<Row>]) -> Result<Option<String>> {
     Ok(Some(text))
 }
 
-/// A table of the pairs of scene and error in which another engine is ahead, their number, and that of all pairs.
+/// A table of the pairs of scene and error in which another engine is ahead, the number of these pairs, and the number
+/// of all pairs.
 pub(super) fn ahead(results: &[Vec<Row>]) -> Result<(String, usize, usize)> {
     let mut text =
         "| scene | error | rows | setting of the largest ratio | its error | relative time |\n|---|---|--:|---|--:|--:|\n".to_owned();
@@ -94,7 +96,7 @@ pub(super) fn ahead(results: &[Vec<Row>]) -> Result<(String, usize, usize)> {
     Ok((text, ahead, compared))
 }
 
-/// All rows of a scene, and for each row of another engine the errors in which it is ahead.
+/// A table of all rows of a scene. For each row of another engine it lists the errors at which the row is ahead.
 fn table(text: &mut String, rows: &[Row], leads: &[Lead], faults: &[Fault]) {
     let Some(first) = rows.first() else { return };
     let _ = write!(text, "\n## {}\n\n{} dynamic bodies, {} steps.\n\n", first.scene, first.bodies, first.steps);

@@ -1,4 +1,5 @@
-//! Times and errors of contenders that step one scene in turns, so that a slow phase of the machine affects all of them.
+//! Measures times and errors of contenders that step one scene in turns, so that a slow phase of the machine affects
+//! all of them.
 
 use super::contender::{Contender, Setting};
 use super::origin::Origin;
@@ -13,7 +14,8 @@ use drystone::stats::{median, quantile};
 use drystone::{Error, Result, SolverConfig, World};
 use drystone_scenes::Scene;
 
-/// Runs all contenders over the steps of `scene`; the rows are in their order. `after_block` is called [`blocks`] times per contender.
+/// Runs all contenders over the steps of `scene`, and returns their rows in the same order. Calls `after_block`
+/// [`blocks`] times per contender.
 pub fn measure(
     scene: &Scene,
     contenders: &mut [Box<dyn Contender + '_>],
@@ -88,7 +90,7 @@ fn moved(world: &World, before: &[(Vec3, Quat)], dt: f32) -> f64 {
     rms_speed(&world)
 }
 
-/// Blocks of a run with this number of steps: at least one in each third.
+/// Number of blocks of a run with this number of steps: at least one in each third.
 pub fn blocks(steps: u32) -> u32 {
     steps.div_ceil(BLOCK).max(3)
 }
@@ -150,7 +152,7 @@ mod tests {
     use drystone::Body;
     use drystone::world::Shape;
 
-    /// An engine whose ball moves at 2 m/s and turns, and whose velocities are `reported` times those.
+    /// An engine whose ball moves at 2 m/s and turns. It reports `reported` times these velocities.
     struct Reports {
         world: World,
         reported: f32,

@@ -29,7 +29,7 @@ pub use tables::tables;
 mod tests {
     use super::Row;
 
-    /// A row of an engine with a time and a mean overlap (m); all of one run.
+    /// A row of an engine with a time and a mean overlap (m). All rows are of one run.
     pub(super) fn row(engine: &str, ms: f64, mean: f64) -> Row {
         let [scene, hash, run] = ["scene", "hash", "run"].map(str::to_owned);
         let (penetration_max, penetration_p95, penetration_mean) = (mean, mean, mean);

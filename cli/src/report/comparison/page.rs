@@ -23,10 +23,10 @@ pub struct Page {
 /// Errors of the profiles over the scenes (m).
 const LEVELS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
-/// Makes the page; an element of `results` holds the rows of one scene.
+/// Makes the page. Each element of `results` has the rows of one scene.
 pub fn page(results: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
     let sides = sides(results);
-    // A side with one setting, such as shaders on a software adapter, has a row in tables and no line in pictures.
+    // A side with one setting, such as the shaders on a software adapter, has a row in tables but no line in pictures.
     let has_line = |side: &&String| results.iter().any(|rows| of_side(rows, side).len() > 1);
     let drawn: Vec<_> = sides.iter().filter(has_line).cloned().collect();
     let main =
@@ -48,12 +48,12 @@ pub fn page(results: &[Vec<Row>], solves: &[Vec<SolveRow>]) -> Result<Page> {
     Ok(Page { html, main })
 }
 
-/// The side of a comparison: an engine, on a GPU or not.
+/// The side of a comparison: an engine, and whether it runs on a GPU.
 fn side(row: &Row) -> String {
     if row.backend == "gpu" { format!("{} gpu", row.engine) } else { row.engine.clone() }
 }
 
-/// The look of the engine, dashed on a GPU.
+/// The look of the engine, with a dashed line on a GPU.
 fn look(side: &str) -> Look {
     match side.split_once(' ') {
         Some((engine, _)) => Look::of_engine(engine).dashed(),
@@ -193,7 +193,7 @@ fn scene(html: &mut String, rows: &[Row], sides: &[String], drawn: &[String]) {
 }
 
 fn at_fixed_times(html: &mut String, rows: &[Row], sides: &[String]) {
-    // 1, 2, 4 and 8 ms, times the power of ten nearest to half the time of the first row.
+    // 1, 2, 4 and 8 ms, times the power of ten nearest to half of the first row's time.
     let scale = 10_f64.powf(rows.first().map_or(0.0, |row| (row.ms / 2.0).log10().round()));
     let times = [1.0, 2.0, 4.0, 8.0].map(|t| t * scale);
     html.push_str("<h3>Least error in a given time</h3>\n");

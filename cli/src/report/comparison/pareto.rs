@@ -3,7 +3,7 @@
 use super::row::Row;
 use drystone::Result;
 
-/// Smallest error (m), (m/s): the resolution of f32 poses some ten meters from the origin.
+/// Smallest error that counts (m, m/s): the resolution of f32 poses some ten meters from the origin.
 pub const FLOOR: f64 = 1e-6;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,8 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The errors for the scene of a row: the gap with joints; else overlaps, speed, and drift if the scene stands.
+    /// The errors for the scene of a row. With joints it is the gap; else they are overlaps, speed, and drift if the
+    /// scene stands.
     pub fn of_scene(row: &Row) -> &'static [Self] {
         use Fault::{Deepest, Drift, Gap, Mean, P95, Speed};
         match (row.joint_gap, row.in_place) {
@@ -46,7 +47,7 @@ impl Fault {
         if self == Self::Speed { "mm/s" } else { "mm" }
     }
 
-    /// The error of a row (m), (m/s); at least [`FLOOR`].
+    /// The error of a row (m, m/s), at least [`FLOOR`].
     pub fn of(self, row: &Row) -> f64 {
         let error = match self {
             Self::Deepest => row.penetration_max,
@@ -56,7 +57,7 @@ impl Fault {
             Self::Drift => row.drift,
             Self::Gap => row.joint_gap.unwrap_or(f64::NAN),
         };
-        // `max` would remove a NaN.
+        // `max` would discard a NaN.
         if error < FLOOR { FLOOR } else { error }
     }
 }
@@ -89,7 +90,7 @@ pub fn front<'a>(rows: &[&'a Row], fault: Fault) -> Vec<&'a Row> {
 /// Comparison of one side with the front of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Duel {
-    /// Largest relative time at equal error; infinite if no own row reaches an error.
+    /// Largest relative time at equal error; infinite if no own row reaches some error.
     pub worst: f64,
     pub best: f64,
     pub own: f64,
@@ -114,8 +115,9 @@ impl Duel {
     }
 }
 
-/// Performance profiles (Dolan and Moré 2002): for each solver the sorted ratios of its costs to the least cost of any solver. The
-/// profile at a factor is the share of problems with a ratio of at most that factor. An unsolved problem has no cost and no ratio.
+/// Performance profiles (Dolan and Moré 2002): for each solver the sorted ratios of its costs to the least cost of any
+/// solver. The profile at a factor is the share of problems with at most that ratio. An unsolved problem has neither a
+/// cost nor a ratio.
 pub fn profile(costs: &[Vec<Option<f64>>]) -> Vec<Vec<f64>> {
     let problems = costs.first().map_or(0, Vec::len);
     let mut ratios = vec![Vec::new(); costs.len()];
@@ -165,7 +167,7 @@ mod tests {
         for (run, hash) in elsewhere.map(|(run, hash)| (run.to_owned(), hash.to_owned())) {
             let other = Row { run, hash, ..row("other", 2.0, 3e-3) };
             let message = Duel::new(&own, &[&other], Fault::Mean).unwrap_err().to_string();
-            assert!(message.contains("no ratio of own") && message.contains("other"), "{message}");
+            assert!(message.contains("cannot compare own") && message.contains("other"), "{message}");
         }
     }
 

@@ -6,9 +6,10 @@ use crate::settings;
 use drystone::{Result, SolverConfig};
 use drystone_scenes::Scene;
 
-/// The scenes of a full and of a brief report that have at most 1,000 bodies.
+/// The scenes with at most 1,000 bodies, for a full and for a brief report.
 ///
-/// Structures that begin in place begin with the impulses that they rest with, in drystone alone. So they fall from gaps besides.
+/// Only drystone starts structures that are built in place with their impulses at rest. Therefore the list also has
+/// structures that fall from gaps.
 const SMALL: [&str; 15] = [
     "tower:n=20,gap=0.005",
     "tower:n=10,top_ratio=1000,gap=0.005",
@@ -27,10 +28,10 @@ const SMALL: [&str; 15] = [
     "pile-mixed:n=600,kinds=6",
 ];
 
-/// The further scenes of a full report.
+/// More scenes of a full report.
 const FULL: [&str; 3] = ["pyramid:base=40,gap=0.005", "pyramid:base=100", "pile:n=5000"];
 
-/// The further scenes of a brief report.
+/// More scenes of a brief report.
 const BRIEF: [&str; 2] = ["pyramid:base=40,gap=0.005", "pyramid:base=40"];
 
 const QUICK: [&str; 6] = [
@@ -42,7 +43,7 @@ const QUICK: [&str; 6] = [
     "wall:rows=10,columns=10",
 ];
 
-/// A scene with this many bodies has fewer steps and settings, and does not run on a software adapter.
+/// Scenes from this number of bodies on have fewer steps and settings, and do not run on a software adapter.
 const LARGE: usize = 2000;
 
 /// Steps of a large scene; the pile is at rest after half of them.
@@ -71,7 +72,7 @@ fn is_large(scene: &Scene) -> bool {
     scene.world.dynamic_count() >= LARGE
 }
 
-/// The substeps of settings that are otherwise at their defaults: up to 128 for few bodies, 32 for many.
+/// The substeps of settings with defaults otherwise: up to 128 for few bodies, 32 for many.
 pub fn substeps(scene: &Scene, extent: Extent) -> impl Iterator<Item = u32> + use<> {
     let most = match (extent, scene.world.dynamic_count()) {
         (_, LARGE..) | (Extent::Quick, 100..) => 32,
@@ -84,9 +85,9 @@ pub fn substeps(scene: &Scene, extent: Extent) -> impl Iterator<Item = u32> + us
 /// Settings with sweeps instead of substeps: substeps, and sweeps per substep.
 const SWEEPS: [(u32, u32); 8] = [(1, 16), (4, 4), (1, 4), (2, 4), (2, 16), (4, 2), (4, 16), (8, 4)];
 
-/// Drystone with the settings of the report: the line of substeps, and from it one step along each other axis. The product of all axes
-/// would be some hundred settings per scene. The reference and the shaders on a software adapter give the errors of the CPU lanes;
-/// they run at the defaults only, for their time.
+/// Drystone with the settings of the report: the line of substeps, and from it one step along each other axis. The
+/// product of all axes would be some hundred settings per scene. The reference and the shaders on a software adapter
+/// have the errors of the CPU lanes, so they run only at the defaults, for their time.
 pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>> {
     let few = is_large(scene) || extent == Extent::Quick;
     let brief = extent == Extent::Brief;
@@ -104,7 +105,7 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
     for (substeps, sweeps) in SWEEPS.into_iter().take(sweeps) {
         let point = format!("substeps={substeps} iterations={sweeps} relax={sweeps}");
         if sweeps > 2 {
-            // Momentum begins with the third sweep.
+            // Momentum starts with the third sweep.
             points.push(("cpu", format!("{point} method=accelerated")));
         }
         points.push(("cpu", point));
@@ -126,11 +127,11 @@ pub fn drystone(scene: &Scene, extent: Extent) -> Result<Vec<Box<dyn Contender>>
         points.extend(some.iter().map(|n| ("cpu", format!("substeps={n} {rule}"))));
     }
     if extent != Extent::Quick {
-        // The same substeps for all islands, whatever they bear.
+        // All islands take the same substeps, for any load.
         for rule in ["", " preload_rate=0 contact_frequency=0.25"] {
             points.extend([1, 2, 4, 8, 16, 32].map(|n| ("cpu", format!("substeps={n} max_substeps={n}{rule}"))));
         }
-        // A looser promise, and a tighter one.
+        // A looser limit on overlap, and a tighter one.
         points.extend([0.1, 0.001].map(|share| ("cpu", format!("max_penetration_share={share}"))));
     }
     if !scene.world.joints.is_empty() {

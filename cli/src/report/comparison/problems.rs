@@ -8,7 +8,7 @@ use crate::report::number::number;
 use crate::report::plot::Scale::Decades;
 use crate::report::plot::{Frame, Look, Series, svg};
 
-/// Errors that tables have the times of.
+/// Errors for which tables have times.
 pub(super) const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
@@ -58,7 +58,7 @@ pub(super) fn solvers(solves: &[Vec<SolveRow>]) -> Vec<String> {
     solvers
 }
 
-/// A table with a row for each problem and a column for each value and solver.
+/// A table with a row for each problem, and a column for each value and solver.
 fn grid_table<const N: usize>(
     html: &mut String,
     solves: &[Vec<SolveRow>],
@@ -77,7 +77,7 @@ fn grid_table<const N: usize>(
     table(html, &headings, solves.iter().map(row));
 }
 
-/// Least time in which a solver reaches an error (ms).
+/// Least time to reach an error with a solver (ms).
 pub(super) fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
     let fit = rows.iter().filter(|row| row.solver() == solver && row.e_vel <= level);
     fit.map(|row| row.ms_low).min_by(f64::total_cmp)

@@ -32,14 +32,14 @@ pub struct SolveRow {
     pub machine: String,
     pub contacts: usize,
     pub method: String,
-    /// `f64`, or `cpu`, which is in f32.
+    /// `f64`, or `cpu` for f32.
     pub backend: String,
     pub sweeps: u32,
-    /// Time of the sweeps: median, least and largest over the turns (ms).
+    /// Time of the sweeps (ms): median, least and largest over the turns.
     pub ms: f64,
     pub ms_low: f64,
     pub ms_high: f64,
-    /// The error after the sweeps, or the round number that it fell below in the last one.
+    /// The error after the sweeps, or the round number that the error passed in the last sweep.
     pub e_vel: f64,
 }
 
@@ -86,7 +86,7 @@ pub fn solves(problem: &ContactProblem, origin: &Origin) -> Result<Vec<SolveRow>
     Ok(rows)
 }
 
-/// Sweeps, error and time at powers of two of sweeps, and where the error falls below round numbers.
+/// Sweeps, error and time at powers of two of sweeps, and at the sweeps in which the error falls below round numbers.
 fn points(report: &SolveReport) -> Vec<(u32, f64, f64)> {
     let curve = report.curve.iter().map(|row| (row.sweeps, row.residuals.e_vel, row.ms));
     let reached = report.reached.iter().filter_map(|r| Some((r.sweeps?, r.e_vel, r.ms?)));

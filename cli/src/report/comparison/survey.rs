@@ -29,9 +29,9 @@ pub struct Survey<'a> {
     pub teams: Vec<&'a Team<'a>>,
     pub extent: Extent,
     pub problems: Vec<ContactProblem>,
-    /// Folder of all files; made if needed.
+    /// Folder of all files. It is created if needed.
     pub out: PathBuf,
-    /// The part that is run, of the scenes and then the problems.
+    /// The part to run: scenes first, then problems.
     pub shard: Shard,
 }
 
@@ -41,10 +41,11 @@ pub struct Report {
 }
 
 impl Survey<'_> {
-    /// Runs the scenes and problems without rows in the folder, and adds their rows after each. `progress` gets the name, the work done
-    /// and the total work.
+    /// Runs the scenes and problems that have no rows in the folder, and adds rows after each of them. `progress` gets
+    /// the name, the completed work and the total work.
     ///
-    /// A scene is finished if one run has rows of every contender, with the same scene, steps, program, machine and threads.
+    /// A scene is finished if one run has rows of every contender, with the same scene, steps, program, machine and
+    /// threads.
     pub fn run(&self, origin: &Origin, progress: &mut dyn FnMut(&str, u64, u64)) -> Result<Report> {
         std::fs::create_dir_all(&self.out).map_err(Error::file(&self.out))?;
         let mut table = Table::<Row>::open(self.out.join(SCENES))?;
@@ -89,11 +90,13 @@ impl Survey<'_> {
         numbered.filter(|(k, _)| self.shard.has(*k)).map(|(_, problem)| problem)
     }
 
-    /// The report of rows that shards of this survey left in folders or files, on any machines; their rows go into the folder. Of a scene that
-    /// several runs measured the last run counts, and `different` gets a line for each error that another run has otherwise.
+    /// The report of the rows that shards of this survey left in folders or files, on any machines. Writes these rows
+    /// into the folder. If several runs measured a scene, the last run counts, and `different` gets a line for each
+    /// error that differs in another run.
     ///
     /// # Errors
-    /// A scene or a problem has no rows with this number of threads; rows are of several programs; a file cannot be read or written.
+    /// A scene or a problem has no rows with this number of threads; rows come from different programs; a file cannot
+    /// be read or written.
     pub fn merge(&self, sources: &[PathBuf], threads: usize, different: &mut dyn FnMut(String)) -> Result<Report> {
         let (rows, solved) = (gathered::<Row>(sources, SCENES)?, gathered::<SolveRow>(sources, PROBLEMS)?);
         let (mut results, mut solves, mut without) = (Vec::new(), Vec::new(), Vec::new());
@@ -150,7 +153,7 @@ impl Measured for SolveRow {
     }
 }
 
-/// The rows of `settings`, in their order, from the last run that has all of them.
+/// The rows of `settings` in order, from the last run that has all of them.
 fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) -> Option<Vec<Row>> {
     let (hash, steps) = (content_hash(scene), super::measure::steps(scene));
     let Origin { build, commit: _, machine, threads } = origin;
@@ -165,7 +168,7 @@ fn finished(rows: &[Row], scene: &Scene, origin: &Origin, settings: &[Setting]) 
     fit.iter().rev().find_map(|row| of_run(&row.run))
 }
 
-/// The rows of the last run on a problem; every run has all solvers of its program.
+/// The rows of the last run on a problem. Every run has all solvers of its program.
 fn solved(rows: &[SolveRow], hash: &str, origin: &Origin) -> Option<Vec<SolveRow>> {
     let fit = |row: &&SolveRow| row.hash == hash && row.build == origin.build && row.machine == origin.machine;
     let last = rows.iter().rfind(fit)?;
@@ -185,7 +188,7 @@ impl<R: Clone + Serialize + DeserializeOwned> Table<R> {
         Ok(Self { path, rows })
     }
 
-    /// Returns the block `known`, or makes a block and adds it to the rows and to the file.
+    /// Returns the block `known`, or makes a block and adds it to the rows and the file.
     fn add_unless(&mut self, known: Option<Vec<R>>, make: impl FnOnce() -> Result<Vec<R>>) -> Result<Vec<R>> {
         if let Some(known) = known {
             return Ok(known);
@@ -215,8 +218,8 @@ impl Report {
         Ok(Self { results, solves })
     }
 
-    /// Writes `index.html`, `speed-against-error.svg` and, with other engines, `equal-error.md` into the folder and returns the path of the
-    /// page.
+    /// Writes `index.html`, `speed-against-error.svg` and, with other engines, `equal-error.md` into the folder and
+    /// returns the path of the page.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let page = page::page(&self.results, &self.solves)?;
         let path = folder.join("index.html");
@@ -229,7 +232,7 @@ impl Report {
     }
 }
 
-/// The rows of the last run of each name, in the order of the first runs. `key` is name and run.
+/// The rows of the last run of each name, in the order of the first runs. `key` returns name and run.
 fn last_of_each<R: Clone>(rows: &[R], key: impl Fn(&R) -> (&String, &String)) -> Vec<Vec<R>> {
     let mut kept: Vec<Vec<R>> = Vec::new();
     for run in rows.chunk_by(|a, b| key(a) == key(b)) {

@@ -1,7 +1,7 @@
-//! The tables of the pages that people read first, from the rows of a report and of a page of performance.
+//! The tables of the first pages for a reader, from the rows of a report and of the page on performance.
 //!
-//! A page has each table between two lines, `<!-- rows: NAME -->` and `<!-- end of rows -->`. All figures of a table are those of the rows,
-//! and the best ones are bold: best as they are printed, so that equal figures are equally bold.
+//! A page has each table between two lines, `<!-- rows: NAME -->` and `<!-- end of rows -->`. All figures come from the
+//! rows, and the best ones are bold. Printed figures are compared, so that equal ones are all bold.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -17,13 +17,13 @@ use crate::files;
 use crate::report::number::number;
 use drystone::{Error, Result};
 
-/// The pages that have tables, from the root of the repository.
+/// The pages with tables, relative to the root of the repository.
 const PAGES: [&str; 2] = ["README.md", "docs/speed-vs-error.md"];
 
 const BEGIN: &str = "<!-- rows: ";
 const END: &str = "<!-- end of rows -->";
 
-/// The engines in the order of their columns, and how a text names them.
+/// The engines in the order of their columns, each with its column title and its name in text.
 const ENGINES: [(&str, &str, &str); 5] = [
     (OWN, "drystone", "drystone"),
     ("rapier", "Rapier", "[Rapier](https://rapier.rs) 0.36"),
@@ -58,14 +58,15 @@ const LEAST: [(&str, &str); 5] = [
     ("chain of {} bodies with a heavy end: gap of a joint", "chain"),
 ];
 
-/// Most rows of errors in which another engine is better.
+/// Largest number of table rows for errors in which another engine is better.
 const MOST_LOST: usize = 6;
 
-/// Writes the tables of the pages below `root` anew, from the rows in `docs/report` and `docs/performance`; gives back the pages. With `check`
-/// nothing is written.
+/// Rewrites the tables of the pages below `root` from the rows in `docs/report` and `docs/performance`, and returns the
+/// pages. With `check`, it writes nothing.
 ///
 /// # Errors
-/// No rows; a table of an unknown name or without an end; with `check`, the first line of a page that is not that of the rows.
+/// There are no rows; a table has an unknown name or no end; with `check`, a page differs from the rows (the message
+/// has the first different line).
 pub fn tables(root: &Path, check: bool) -> Result<Vec<PathBuf>> {
     let rows = Rows::read(&root.join("docs"))?;
     let write = |page: &str| {
@@ -75,7 +76,7 @@ pub fn tables(root: &Path, check: bool) -> Result<Vec<PathBuf>> {
         match first_difference(&text, &new) {
             Some((line, was, is)) if check => {
                 let page = path.display();
-                Err(Error::input(format!("{page}: line {line} is not that of the rows: {was:?}, now {is:?}")))
+                Err(Error::input(format!("{page}: line {line} is {was:?}, but the rows give {is:?}")))
             }
             Some(_) => files::write(&path, new.as_bytes()).map(|()| path),
             None => Ok(path),
@@ -91,7 +92,7 @@ fn first_difference<'a>(old: &'a str, new: &'a str) -> Option<(usize, &'a str, &
     pairs.filter(|(_, (old, new))| old != new).map(|(k, (old, new))| (k, old.unwrap_or(""), new.unwrap_or(""))).next()
 }
 
-/// All rows that pages have tables of.
+/// All rows that the tables use.
 struct Rows {
     results: Vec<Vec<Row>>,
     solves: Vec<Vec<SolveRow>>,
@@ -105,7 +106,7 @@ impl Rows {
         Ok(Self { results, solves, thirds })
     }
 
-    /// A page with all its tables anew.
+    /// A page with all its tables rewritten.
     fn rewritten(&self, page: &str) -> Result<String> {
         let mut parts = page.split(BEGIN);
         let mut text = parts.next().unwrap_or_default().to_owned();
@@ -130,11 +131,14 @@ impl Rows {
                 ))
             }
             "problems" => Ok(self.problems()),
-            _ => Err(Error::input(format!("no rows {name:?}: engines, equal error, kinds, ahead or problems"))),
+            _ => Err(Error::input(format!(
+                "unknown rows {name:?}: must be engines, equal error, kinds, ahead or problems"
+            ))),
         }
     }
 
-    /// The table of the first page: engines at their defaults, least errors, and where another engine is better.
+    /// The table of the first page: engines at their defaults, least errors, and the errors in which another engine is
+    /// better.
     fn engines(&self) -> Result<String> {
         let known = |engine: &str| {
             self.results.iter().flatten().any(|row| row.engine == engine)
@@ -202,7 +206,7 @@ impl Rows {
         self.results.iter().find(|rows| rows[0].scene == name).map(Vec::as_slice)
     }
 
-    /// Adds a row, if the scene has rows.
+    /// Adds a row if the scene has rows.
     fn row(&self, text: &mut String, what: &str, scene: &str, cells: Vec<Cell>) {
         let bodies = self.scene(scene).map(|rows| rows[0].bodies);
         let bodies = bodies.or_else(|| self.thirds.iter().find(|row| row.scene == scene).map(|row| row.bodies));
@@ -211,7 +215,7 @@ impl Rows {
         }
     }
 
-    /// Time of a step and mean overlap of an engine's first setting, which are its defaults.
+    /// Time of a step and mean overlap for an engine's first setting, its defaults.
     fn at_defaults(&self, scene: &str, engine: &str) -> Cell {
         let figures = |ms: f64, mean: f64| Cell::of([Figure::of(ms, "ms"), Figure::of(1e3 * mean.max(FLOOR), "mm")]);
         if let Some(rows) = self.scene(scene) {
@@ -227,7 +231,7 @@ impl Rows {
         figures(end.ms, end.penetration_mean)
     }
 
-    /// Errors and times at equal error, scene by scene.
+    /// Least errors, and times at equal error, scene by scene.
     fn equal_error(&self) -> Result<String> {
         let mut text = "| scene | error | least, drystone | least, others | relative time, smallest | largest |\n|---|---|--:|--:|--:|--:|\n"
             .to_owned();
@@ -256,7 +260,7 @@ impl Rows {
         Duel::new(&of_side(rows, OWN), &others, fault)
     }
 
-    /// The ranges of times at equal error, kind by kind of scenes.
+    /// The ranges of times at equal error for each kind of scene.
     fn kinds(&self) -> Result<String> {
         let kind = |row: &Row| match (row.joint_gap, row.in_place) {
             (Some(_), _) => "joints",
@@ -286,7 +290,7 @@ impl Rows {
         Ok(text)
     }
 
-    /// Least times of solvers to errors of contact problems.
+    /// Least times of the solvers to reach errors of contact problems.
     fn problems(&self) -> String {
         let solvers = solvers(&self.solves);
         let levels = SOLVED.into_iter().filter(|&level| level < 0.1);
@@ -311,7 +315,7 @@ fn least(rows: &[Row], engine: &str, fault: Fault) -> Cell {
     Cell::of(front(&own, fault).last().map(|row| Figure::of(fault.of(row) * 1e3, fault.unit())))
 }
 
-/// The figures of a cell; none where nothing holds, and then a word may say why.
+/// The figures of a cell. Without figures, `word` can give the reason.
 #[derive(Clone, Debug, Default)]
 struct Cell {
     figures: Vec<Figure>,
@@ -324,7 +328,7 @@ impl Cell {
     }
 }
 
-/// A number as it is printed, and its unit.
+/// A number in its printed form, and its unit.
 #[derive(Clone, Debug)]
 struct Figure {
     number: String,
@@ -345,7 +349,7 @@ impl Figure {
     }
 }
 
-/// The cells of a row of a table; of the first figures, the second figures and so on the least are bold.
+/// The cells of a table row. The least of all first figures is bold, the least of all second figures, and so on.
 fn bold(cells: Vec<Cell>) -> String {
     let count = cells.iter().map(|cell| cell.figures.len()).max().unwrap_or(0);
     let column = |k: usize| cells.iter().filter_map(move |cell| cell.figures.get(k));
@@ -379,7 +383,7 @@ mod tests {
     use super::super::{Extent, scenes};
     use super::*;
 
-    /// A typing error in the name of a scene would leave its row out.
+    /// Without this test, a typing error in the name of a scene would silently remove its row.
     #[test]
     fn the_scenes_of_the_table_are_those_that_are_measured() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace");

@@ -1,11 +1,11 @@
-//! The thirds of a run: a run that falls, lands and rests has no one time of a step.
+//! The thirds of a run. A run in which bodies fall, land and rest has no single step time.
 
 use std::ops::Range;
 
 use super::row::{BLOCK, Lane, Row, WindowRow};
 use drystone::stats::{largest, median};
 
-/// The windows of each contender, in the order of `thirds`, which are ranges of blocks. A contender has those that it finished.
+/// The windows of each contender that it finished, in the order of `thirds`, which are ranges of blocks.
 pub(super) fn windows(rows: &[Row], lanes: &[Lane], thirds: &[Range<usize>]) -> Vec<Vec<WindowRow>> {
     let of = |row: &Row, lane: &Lane, third: &Range<usize>| {
         let errors = lane.errors.iter().find(|(block, _)| block + 1 == third.end).map(|(_, errors)| errors)?;
@@ -41,8 +41,8 @@ pub(super) fn windows(rows: &[Row], lanes: &[Lane], thirds: &[Range<usize>]) -> 
     all.map(|(row, lane)| thirds.iter().map_while(|third| of(row, lane, third)).collect()).collect()
 }
 
-/// Median over the blocks of a third of the time of a step relative to that of another contender in its turn of the same round; none if
-/// the other did not finish the third.
+/// Median over the blocks of a third: the time of a step relative to that of another contender in the same round.
+/// `None` if the other did not finish the third.
 fn time_ratio(own: &Lane, other: &Lane, third: &Range<usize>) -> Option<f64> {
     let block = |lane: &Lane, k: usize| lane.steps.chunks(BLOCK as usize).nth(k).map(median);
     let ratios: Option<Vec<_>> = third.clone().map(|k| Some(block(own, k)? / block(other, k)?)).collect();
@@ -59,7 +59,7 @@ mod tests {
     use drystone::SolverConfig;
     use drystone_scenes::Scene;
 
-    /// A lane over six blocks whose thirds have these times; it has errors of `finished` thirds, of one millimeter each.
+    /// A lane over six blocks. Its thirds have these times, and the first `finished` of them have errors.
     fn lane(ms: [f64; 3], finished: usize) -> Lane {
         let errors = |third: usize| (2 * third + 1, Errors { speed: 1e-3 * (third + 1) as f64, ..Errors::default() });
         Lane {

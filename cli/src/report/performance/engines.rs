@@ -9,7 +9,7 @@ use crate::report::plot::{Frame, Look, Scale, Series, grid, svg};
 /// The engine of the page.
 pub(super) const OWN: &str = "drystone";
 
-/// Values in the order in which they first occur.
+/// Values in the order of their first occurrence.
 pub(super) fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
     let mut kept = Vec::new();
     all.for_each(|value| {
@@ -25,7 +25,6 @@ fn thirds<'a>(rows: &'a [WindowRow], scene: &str, threads: usize, setting: &str)
     rows.iter().filter(|r| (&*r.scene, r.threads, &*r.setting) == (scene, threads, setting)).collect()
 }
 
-/// Some numbers as one cell.
 fn cell(numbers: impl Iterator<Item = f64>) -> String {
     numbers.map(number).collect::<Vec<_>>().join(", ")
 }
@@ -55,7 +54,7 @@ pub(super) fn table(rows: &[WindowRow]) -> String {
                 let ms = cell(own.iter().map(|r| r.ms));
                 let _ = write!(text, " {ms} | {to_best} | {slow} |");
             }
-            // Errors of the first number of threads.
+            // Errors are those of the first number of threads.
             let own = thirds(rows, scene, all_threads[0], setting);
             let mean = cell(own.iter().map(|r| 1e3 * r.penetration_mean));
             let Some(end) = own.last() else {
@@ -70,7 +69,7 @@ pub(super) fn table(rows: &[WindowRow]) -> String {
     text
 }
 
-/// Time of a step over the run, one frame a scene, on the least number of threads.
+/// Time of a step over the run on the smallest number of threads, with one frame for each scene.
 pub(super) fn picture(rows: &[WindowRow]) -> String {
     let threads = rows.iter().map(|r| r.threads).min().unwrap_or(1);
     let frame_of = |scene: &str| {
@@ -78,7 +77,7 @@ pub(super) fn picture(rows: &[WindowRow]) -> String {
         let series = settings.iter().filter_map(|setting| {
             let own = thirds(rows, scene, threads, setting);
             let engine = &*own.first()?.engine;
-            // An engine's first setting is its default.
+            // The first setting of an engine is its default.
             let is_first = rows.iter().find(|r| r.engine == engine).is_some_and(|r| r.setting == **setting);
             let look = Look::of_engine(engine);
             let look = if is_first { look } else { look.dashed() };

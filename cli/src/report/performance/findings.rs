@@ -1,4 +1,4 @@
-//! A paragraph a finding, with the figures of the rows.
+//! One paragraph for each finding, with figures from the rows.
 
 use std::fmt::Write as _;
 
@@ -11,11 +11,11 @@ use crate::report::prose::wrapped_page;
 
 pub(super) fn findings(rows: &Rows) -> String {
     [
-        ("Beside other engines", "engines-1.csv, engines-2.csv", beside(&rows.engines)),
-        ("No step that stalls", "engines-1.csv, engines-2.csv", stalls(&rows.engines)),
+        ("Other engines", "engines-1.csv, engines-2.csv", beside(&rows.engines)),
+        ("Slowest steps", "engines-1.csv, engines-2.csv", stalls(&rows.engines)),
         ("Stages of a step, falling and at rest", "falling.csv", stages(&rows.falling)),
         ("One island of any size", "growth.csv", growth(&rows.growth)),
-        ("Sweeps and the limits of the machine", "limits.csv", limits(&rows.limits)),
+        ("Sweeps and hardware limits", "limits.csv", limits(&rows.limits)),
         ("Many worlds", "worlds.csv", worlds(&rows.worlds)),
         ("Saved states", "states.csv", states(&rows.states)),
     ]
@@ -32,7 +32,7 @@ fn on(threads: usize) -> String {
     if threads == 1 { "one thread".into() } else { format!("{threads} threads") }
 }
 
-/// The least and the largest number, as text.
+/// The smallest and the largest number, as text.
 fn range(numbers: impl Iterator<Item = f64> + Clone) -> String {
     let (low, high) = (numbers.clone().fold(f64::INFINITY, f64::min), numbers.fold(0.0, f64::max));
     format!("{} to {}", number(low), number(high))
@@ -47,7 +47,7 @@ fn beside(rows: &[WindowRow]) -> String {
             most.map_or_else(String::new, |(_, r)| format!(", most in {}, steps {} to {}", r.scene, r.from, r.to));
         format!("{} ({}{of_most})", range(ratios().map(|r| r.0)), on(threads))
     });
-    // Of the overlap of the other engine that has least, third by third.
+    // Relative to the smallest overlap of another engine, for each third.
     let to_least = |mine: &WindowRow| {
         let same = |r: &&WindowRow| r.engine != OWN && (&r.run, r.from) == (&mine.run, mine.from);
         let least = rows.iter().filter(same).map(|r| r.penetration_mean).reduce(f64::min)?;
@@ -77,13 +77,15 @@ fn stalls(rows: &[WindowRow]) -> String {
     )
 }
 
-/// The thirds of the largest scene on the least number of threads.
+/// The thirds of the largest scene on the smallest number of threads.
 fn stages(rows: &[FallingRow]) -> String {
     let key = |r: &FallingRow| (r.bodies, std::cmp::Reverse(r.threads));
     let Some(most) = rows.iter().map(key).max() else { return String::new() };
     let shown: Vec<_> = rows.iter().filter(|r| key(r) == most).collect();
     let mut text = format!(
-        "Medians of {}, {}, in ms. A manifold has the contact points of two shapes:\n\n",
+        "Medians of {}, {}, times in ms. A manifold has the contact points of two shapes.\n\n\
+         | steps | step | detection | colors | rows | sweeps | store | pairs recomputed | manifolds |\n\
+         |---|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         shown[0].scene,
         on(shown[0].threads)
     );
@@ -91,8 +93,7 @@ fn stages(rows: &[FallingRow]) -> String {
         let [ms, detect, color, prepare, run, store] = [r.ms, r.detect, r.color, r.prepare, r.run, r.store].map(number);
         let _ = writeln!(
             text,
-            "* steps {} to {}: {ms}, with detection {detect}, colors {color}, rows {prepare}, sweeps {run}, store {store}; {} of {} \
-             pairs recomputed, {} manifolds",
+            "| {} to {} | {ms} | {detect} | {color} | {prepare} | {run} | {store} | {} of {} | {} |",
             r.from, r.to, r.computed, r.pairs, r.manifolds
         );
     }
@@ -101,18 +102,20 @@ fn stages(rows: &[FallingRow]) -> String {
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The times are the least of the stage `run`, the sweeps, per manifold and pass \
-         over all contacts, in parentheses relative to the smallest island. Bytes are the peak of the whole \
-         process:\n\n",
+        "A plane pyramid is one island. The time of the sweeps is the least of the stage `run` per manifold and pass \
+         over all contacts, in parentheses relative to the smallest island. Bytes are the peak of the whole process. \
+         The other times are in ms, on the threads of their row.\n\n\
+         | boxes | sweeps, ns per manifold and pass | bytes a box | threads | step | detection | rows | sweeps |\n\
+         |--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for scene in distinct(rows.iter().map(|r| &r.scene)) {
         let own: Vec<_> = rows.iter().filter(|r| r.scene == *scene).collect();
-        let times = own.iter().map(|r| format!("{} ns ({}) with {}", number(r.ns), number(r.growth), on(r.threads)));
-        let memory = own[0].bytes_a_box.map_or_else(String::new, |bytes| format!("; {bytes:.0} bytes a box"));
+        let times = own.iter().map(|r| format!("{} ({}) with {}", number(r.ns), number(r.growth), on(r.threads)));
+        let memory = own[0].bytes_a_box.map_or_else(String::new, |bytes| format!("{bytes:.0}"));
         let [ms, detect, rows, run] = [own[0].ms, own[0].detect, own[0].prepare, own[0].run].map(number);
         let _ = writeln!(
             text,
-            "* {} boxes: {}{memory}; a step with {} takes {ms} ms, with detection {detect}, rows {rows}, sweeps {run}",
+            "| {} | {} | {memory} | {} | {ms} | {detect} | {rows} | {run} |",
             own[0].boxes,
             times.collect::<Vec<_>>().join(", "),
             on(own[0].threads)
@@ -123,17 +126,18 @@ fn growth(rows: &[GrowthRow]) -> String {
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
-        "One sweep over a point with friction between two cubes takes {OPERATIONS} scalar operations, counted by a \
-         number type that counts. The lanes are the SIMD lanes of the processor. Bytes are read and written by the \
-         lanes, in parentheses by the kernels over plain rows, which load a body for each of its contacts. The triad \
-         is a = b + s c over as many bytes as the lanes hold. Bodies in a cache can exceed 100 % of it. The peak is \
-         that of multiplications and additions on registers:\n\n",
+        "One sweep over a point with friction between two cubes takes {OPERATIONS} scalar operations, counted by an \
+         instrumented number type. Bytes are those that the SIMD lanes read and write, in parentheses those of the \
+         kernels over plain rows, which load a body for each of its contacts. The triad is a = b + s c over the MiB \
+         that the lanes hold; bodies in a cache can exceed 100 % of it. The peak is that of multiplications and \
+         additions on registers.\n\n\
+         | scene | MiB | threads | ns a manifold | bytes a manifold | million points a second | of the triad, GB/s | of the peak, G/s |\n\
+         |---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for r in rows {
         let _ = writeln!(
             text,
-            "* {} ({} MiB), {}: {} ns and {:.0} ({:.0}) bytes a manifold, {} million points a second: {:.0} % of a triad of {} GB/s, \
-             {:.0} % of a peak of {} G/s",
+            "| {} | {} | {} | {} | {:.0} ({:.0}) | {} | {:.0} % of {} | {:.0} % of {} |",
             r.scene,
             number(r.held as f64 / f64::from(1 << 20)),
             on(r.threads),
@@ -164,9 +168,9 @@ fn worlds(rows: &[WorldsRow]) -> String {
 
 fn states(rows: &[StatesRow]) -> String {
     let mut text = String::from(
-        "The pile is awake and at rest. A step is in ms, the other times are relative to it. `Rollback::push` copies \
-         a state into allocated memory, `Simulation::restore` returns to it, `save` and `load` convert a state to and \
-         from bytes:\n\n\
+        "The pile is awake and at rest. A step is in ms; the other times are relative to it. `Rollback::push` copies \
+         a state into allocated memory, and `Simulation::restore` returns to it. `save` and `load` convert a state to \
+         and from bytes.\n\n\
          | scene | threads | step | push | restore | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for r in rows {

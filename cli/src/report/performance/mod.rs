@@ -1,4 +1,5 @@
-//! `drystone report performance`: a table, a picture and a paragraph a finding, from rows that other commands measured.
+//! `drystone report performance`: a table, a picture, and one paragraph for each finding, from rows that other commands
+//! measured.
 
 mod engines;
 mod findings;
@@ -12,7 +13,7 @@ use super::comparison::WindowRow;
 use crate::files;
 use drystone::{Error, Result};
 
-/// The rows in the folder of the page, file by file.
+/// The rows in the folder of the page, by file.
 struct Rows {
     engines: Vec<WindowRow>,
     falling: Vec<FallingRow>,
@@ -22,10 +23,11 @@ struct Rows {
     states: Vec<StatesRow>,
 }
 
-/// Files of `drystone-peers --thirds`, one for each number of threads: Rapier's builds for one and for several differ.
+/// Files of `drystone-peers --thirds`, one for each number of threads: Rapier has separate builds for one thread and
+/// for several.
 const ENGINES: [&str; 2] = ["engines-1.csv", "engines-2.csv"];
 
-/// Steps of the longest run of a page that is no short run.
+/// Number of steps of the longest run on a full page.
 const FULL: usize = 300;
 
 impl Rows {
@@ -53,7 +55,7 @@ impl Rows {
     }
 }
 
-/// The rows of a file; at least one.
+/// The rows of a file, at least one.
 fn rows<R: DeserializeOwned>(folder: &Path, name: &str) -> Result<Vec<R>> {
     let path = folder.join(name);
     let rows: Vec<R> = files::rows(&path)?;
@@ -63,7 +65,8 @@ fn rows<R: DeserializeOwned>(folder: &Path, name: &str) -> Result<Vec<R>> {
     Ok(rows)
 }
 
-/// Writes `performance.md` and `performance/engines.svg` into a directory, from the CSV files in its folder `performance`.
+/// Writes `performance.md` and `performance/engines.svg` into a directory, from the CSV files in its folder
+/// `performance`.
 pub fn performance(directory: &Path) -> Result<()> {
     let folder = directory.join("performance");
     let rows = Rows::read(&folder)?;

@@ -1,13 +1,13 @@
-//! Places for labels, on nothing that is drawn and on no other label.
+//! Finds places for labels that overlap neither the drawing nor other labels.
 
 use std::ops::Range;
 
 type Place = (i32, i32);
 
-/// A box: its left upper and its right lower corner (pixels).
+/// A box: its upper left and lower right corner (pixels).
 type Area = (Place, Place);
 
-/// The places that labels avoid, and those where they may stand.
+/// The area for labels, and the parts of it that are taken.
 pub(super) struct Labels {
     inside: Area,
     taken: Vec<Area>,
@@ -27,7 +27,8 @@ impl Labels {
         self.taken.push(((x - 5, y - 5), (x + 5, y + 5)));
     }
 
-    /// The left upper corner of a label of this size beside a mark, which is taken from then on; none if there is no room.
+    /// The upper left corner for a label of this size beside a mark; `None` if there is no room. The place is taken
+    /// from then on.
     pub(super) fn free(&mut self, (x, y): Place, (width, height): (i32, i32)) -> Option<Place> {
         let (left, right, above, below) = (x - width - 6, x + 7, y - height - 4, y + 5);
         let corners = [
@@ -51,7 +52,7 @@ impl Labels {
                 && !self.segments.iter().any(|&segment| crosses(segment, area))
         };
         let corner = corners.into_iter().find(fits)?;
-        // Some space to the next label.
+        // Keep some space to the next label.
         self.taken.push(((corner.0 - 3, corner.1), (corner.0 + width + 3, corner.1 + height)));
         Some(corner)
     }
@@ -65,7 +66,7 @@ fn overlap(a: Area, b: Area) -> bool {
 fn crosses(((ax, ay), (bx, by)): (Place, Place), area: Area) -> bool {
     const SPACE: i32 = 2;
     let (low, high) = ((area.0.0 - SPACE, area.0.1 - SPACE), (area.1.0 + SPACE, area.1.1 + SPACE));
-    // The part of the segment, as a share of it, that lies within each pair of sides.
+    // The interval of the segment, as shares of its length, between each pair of sides.
     let within = |from: i32, to: i32, low: i32, high: i32| {
         let [from, to, low, high] = [from, to, low, high].map(f64::from);
         let shares = if from == to {
@@ -80,7 +81,8 @@ fn crosses(((ax, ay), (bx, by)): (Place, Place), area: Area) -> bool {
     x.0.max(y.0) <= x.1.min(y.1)
 }
 
-/// Ascending places, each moved as little as needed to be `space` apart and, if they all fit there, in `range`.
+/// Ascending places, moved as little as possible until they are `space` apart and within `range`, if they all fit
+/// there.
 pub(super) fn apart(places: &[i32], space: i32, range: Range<i32>) -> Vec<i32> {
     let mut all = places.to_vec();
     let mut least = range.start;
@@ -105,11 +107,11 @@ mod tests {
         let mut labels = Labels::new(0..100, 0..100);
         labels.keep_off_mark((50, 50));
         assert_eq!(labels.free((50, 50), (20, 10)), Some((57, 36)));
-        // Where the first label was, the second is not.
+        // The second label avoids the first.
         assert_eq!(labels.free((50, 50), (20, 10)), Some((24, 55)));
         labels.keep_off_path(&[(0, 40), (48, 40), (48, 0)]);
         assert_eq!(labels.free((50, 50), (20, 10)), Some((57, 55)), "not above on the left, where a line is");
-        // No room is left of, right of or above a mark in the corner of a full picture.
+        // There is no room to the left, to the right or above a mark in the corner of a full picture.
         let mut full = Labels::new(0..100, 0..100);
         full.keep_off_path(&[(0, 12), (30, 12), (0, 0)]);
         assert_eq!(full.free((4, 4), (30, 10)), None);

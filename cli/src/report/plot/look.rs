@@ -1,8 +1,8 @@
-//! Colors, marks and lines of series: an engine has the same in every picture.
+//! Colors, marks and lines of series. An engine has the same look in every picture.
 
 use plotters::prelude::*;
 
-/// Colors that differ for the color-blind too (Okabe and Ito).
+/// Colors that color-blind readers can distinguish too (Okabe and Ito).
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -15,7 +15,7 @@ const COLORS: [RGBColor; 6] = [
 /// The engines, in the order of their colors and marks.
 const ENGINES: [&str; 6] = ["drystone", "rapier", "box3d", "physx", "another", "bullet"];
 
-/// Red, green and blue of an engine in pictures.
+/// Color of an engine in pictures: red, green and blue.
 pub fn engine_color(name: &str) -> (u8, u8, u8) {
     let RGBColor(r, g, b) = Look::of_engine(name).color();
     (r, g, b)
@@ -29,7 +29,7 @@ pub struct Look {
 }
 
 impl Look {
-    /// One of six looks that differ.
+    /// One of six different looks.
     pub const fn nth(k: usize) -> Self {
         Self { number: k % COLORS.len(), dashed: false }
     }
@@ -40,7 +40,7 @@ impl Look {
         Self::nth(ENGINES.iter().position(|&engine| engine == name).or(another).unwrap_or(0))
     }
 
-    /// The same color and mark with a dashed line: of the same engine, set otherwise.
+    /// The same color and mark with a dashed line, for other settings of the same engine.
     pub const fn dashed(self) -> Self {
         Self { dashed: true, ..self }
     }
@@ -49,7 +49,7 @@ impl Look {
         COLORS[self.number]
     }
 
-    /// The color, as dark as text has to be.
+    /// The color, darkened for text.
     pub(super) fn text(self) -> RGBColor {
         let RGBColor(r, g, b) = self.color();
         let [r, g, b] = [r, g, b].map(|channel| (f64::from(channel) * 0.75) as u8);
@@ -57,7 +57,7 @@ impl Look {
     }
 }
 
-/// The pieces of a path that are drawn: all of it, or dashes.
+/// The parts of a path to draw: all of it, or dashes.
 pub(super) fn dashes(look: Look, path: &[(i32, i32)]) -> Vec<Vec<(i32, i32)>> {
     const DASH: f64 = 6.0;
     if !look.dashed {
@@ -71,7 +71,7 @@ pub(super) fn dashes(look: Look, path: &[(i32, i32)]) -> Vec<Vec<(i32, i32)>> {
             let share = along / length;
             ((from.0 + share * (to.0 - from.0)).round() as i32, (from.1 + share * (to.1 - from.1)).round() as i32)
         };
-        // Every other stretch of the whole path, as far as it lies here.
+        // Every second interval of the whole path, clipped to this segment.
         let first = (walked / (2.0 * DASH)).floor() as i64;
         let last = ((walked + length) / (2.0 * DASH)).floor() as i64;
         for k in first..=last {
@@ -86,7 +86,7 @@ pub(super) fn dashes(look: Look, path: &[(i32, i32)]) -> Vec<Vec<(i32, i32)>> {
     pieces
 }
 
-/// A circle, triangle, square, diamond, X or inverted triangle of some 8 pixels.
+/// A circle, triangle, square, diamond, X or inverted triangle of about 8 pixels.
 pub(super) fn mark<'a>(
     look: Look,
     at: (i32, i32),

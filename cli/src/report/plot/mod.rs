@@ -18,7 +18,7 @@ pub struct Series {
     pub name: String,
     pub look: Look,
     pub points: Vec<(f64, f64, String)>,
-    /// Corners of the line: straight from one to the next if x is linear, else in stairs.
+    /// Corners of the line. They are connected straight if x is linear, else in stairs.
     pub line: Vec<(f64, f64)>,
 }
 
@@ -125,7 +125,7 @@ fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series],
             }
         }
     }
-    // Beside the plot, each name where its curve ends.
+    // Beside the plot, each name stands where its curve ends.
     let ends = paths.iter().zip(&places).map(|(path, places)| path.last().or(places.last()).map(|end| end.1));
     let mut legend: Vec<_> = series.iter().zip(ends).filter_map(|(s, end)| Some((end?, s))).collect();
     legend.sort_by_key(|(end, _)| *end);
@@ -141,7 +141,7 @@ fn draw(root: &DrawingArea<SVGBackend, Shift>, frame: &Frame, series: &[Series],
     Ok(())
 }
 
-/// Stairs through the corners along the axes, continued to the right end.
+/// Stairs through the corners along the axes, extended to the right end.
 fn stairs(line: &[(f64, f64)], right: f64, rising: bool) -> Vec<(f64, f64)> {
     let mut stairs = Vec::new();
     for (i, &(x, y)) in line.iter().enumerate() {
@@ -187,7 +187,7 @@ mod tests {
         }
     }
 
-    /// Each name stands once, beside the plot, in the order of the ends of the curves.
+    /// Each name appears once beside the plot, in the order of the ends of the curves.
     #[test]
     fn names_stand_beside_the_ends_of_their_curves() {
         let frame = Frame { title: "t", x: "x", y: "y", scales: (Scale::Linear, Scale::Linear), size: (400, 300) };

@@ -27,9 +27,9 @@ fn block_on_floor(velocity: Vec3, spin: f32, mu: f32) -> World {
 pub(super) fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its distance; Coulomb's law\n\
-         gives v²/(2 mu g) = {:.3} m. The axes of `box` are the tangents of the contact. *Creep* is the distance\n\
-         that a block with mu 0.5 moves in 10 s on a slope of 20°.\n\n\
+        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its sliding distance, which is\n\
+         v²/(2 mu g) = {:.3} m by Coulomb's law. The axes of `box` are the tangents of the contact. *Creep* is the distance that\n\
+         a block with mu 0.5 moves in 10 s on a slope of 20°.\n\n\
          | friction | 0° | 15° | 30° | 45° | largest spread | creep |\n|---|---|---|---|---|---|---|",
         16.0 / (2.0 * 0.4 * 9.81)
     );
@@ -51,7 +51,7 @@ pub(super) fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
     thrown_ball(report, after_run)
 }
 
-/// Distance from the origin of a block in `world` after some steps (m).
+/// Distance of the block of `world` from the origin after some steps (m).
 fn distance(world: World, rule: &str, steps: u32) -> Result<f64> {
     let mut simulation = simulate(world, &friction_settings(rule))?;
     (0..steps).try_for_each(|_| simulation.step(DT).map(drop))?;
@@ -59,13 +59,14 @@ fn distance(world: World, rule: &str, steps: u32) -> Result<f64> {
     Ok(f64::from(p.x.hypot(p.z)))
 }
 
-/// Sliding distance of a block with mu 0.4 that starts at 4 m/s in a direction at `degrees` to its edges (m).
+/// Sliding distance (m) of a block with mu 0.4 that starts at 4 m/s, in a direction at `degrees` to its edges.
 fn sliding_distance(rule: &str, degrees: f32) -> Result<f64> {
     let direction = Quat::from_rotation_y(degrees.to_radians()) * Vec3::X;
     distance(block_on_floor(direction * 4.0, 0.0, 0.4), rule, 240)
 }
 
-/// Distance that a block with mu 0.5 on a slope of 20 degrees moves in 10 s (m). Gravity is inclined instead of the floor.
+/// Distance that a block with mu 0.5 moves in 10 s on a slope of 20 degrees (m). Gravity is inclined instead of the
+/// floor.
 fn creep(rule: &str) -> Result<f64> {
     let mut world = block_on_floor(Vec3::ZERO, 0.0, 0.5);
     world.gravity = Quat::from_rotation_y(0.5) * Quat::from_rotation_z(20_f32.to_radians()) * world.gravity;
@@ -75,9 +76,9 @@ fn creep(rule: &str) -> Result<f64> {
 fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThe block starts at 2 m/s and 5 rad/s. Under Coulomb's law sliding and spinning end together. Friction\n\
-         acts below the center of mass and shifts the load forward, so the path bends. Friction per manifold\n\
-         lacks this effect, and sliding does not weaken its friction against the spin.\n\n\
+        "\nThe block starts at 2 m/s and 5 rad/s. Under Coulomb's law sliding and spinning end together, and the path bends,\n\
+         because friction acts below the center of mass and shifts the load forward. Friction per manifold lacks this effect,\n\
+         and sliding does not weaken its friction against the spin.\n\n\
          | friction | slides for | spins for | distance from its line |\n|---|---|---|---|"
     );
     let mut lines = Vec::new();
@@ -94,8 +95,8 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
     Ok(())
 }
 
-/// Times (s) for which a block slides and spins that starts at 2 m/s and 5 rad/s, its largest distance from the straight line (m), and its
-/// speed over time.
+/// For a block that starts at 2 m/s and 5 rad/s: the times for which it slides and spins (s), its largest distance from
+/// the straight line (m), and its speed over time.
 fn sliding_spin(rule: &str, more: &str) -> Result<([f64; 3], Line)> {
     let text = format!("{} {more}", friction_settings(rule));
     let mut simulation = simulate(block_on_floor(Vec3::X * 2.0, 5.0, 0.4), &text)?;
@@ -126,7 +127,7 @@ fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<
         let thrown = fastest(&scene.world).1;
         let boxes = scene.world.dynamic_count() - 1;
         let speed = scene.world.bodies[thrown].linear_velocity.x;
-        // The hit has happened when the ball has lost a tenth of its speed.
+        // The hit is over when the ball has lost a tenth of its speed.
         let (mut before, mut hit) = (boxes, false);
         for _ in 0..scene.steps {
             simulation.step(scene.dt)?;
@@ -150,7 +151,7 @@ fn standing_boxes(was: &World, is: &World, thrown: usize) -> usize {
 mod tests {
     use super::*;
 
-    /// docs/rules.md has these numbers: v²/(2 mu g) = 2.039 m in every direction under the disc only.
+    /// The numbers of docs/rules.md: v²/(2 mu g) = 2.039 m in every direction, under the disc only.
     #[test]
     fn a_block_slides_as_far_in_every_direction_under_the_disc_only() {
         let slid = |rule, degrees| sliding_distance(rule, degrees).expect("a run") / (16.0 / (2.0 * 0.4 * 9.81));

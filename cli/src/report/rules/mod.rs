@@ -21,7 +21,7 @@ pub struct RulesReport {
 }
 
 impl RulesReport {
-    /// Writes `rules.md` and the pictures into a directory, which is made if needed.
+    /// Writes `rules.md` and the pictures into a directory, which is created if needed.
     pub fn write(&self, directory: &Path) -> Result<()> {
         let pictures = directory.join("rules");
         std::fs::create_dir_all(&pictures).map_err(Error::file(&pictures))?;
@@ -37,7 +37,7 @@ const DT: f32 = 1.0 / 60.0;
 /// Times (s) and values of a line in a plot.
 type Line = Vec<(f64, f64)>;
 
-/// Runs everything and makes the page; calls `after_run` [`RUNS`] times.
+/// Runs everything and makes the page. Calls `after_run` [`RUNS`] times.
 pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
     let mut report = RulesReport { page: include_str!("../rules_head.md").to_owned(), pictures: Vec::new() };
     stacks::clamping(&mut report, &mut after_run)?;
@@ -49,16 +49,17 @@ pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
     Ok(report)
 }
 
-/// All bodies fall at 1 mm/s at the start, so that none begins with the impulses that it rests with: rules differ in how a load comes on.
+/// Makes all bodies fall at 1 mm/s at the start, so that no body starts with its impulses at rest: rules differ in
+/// their reaction to a new load.
 fn simulate(mut world: World, settings_text: &str) -> Result<Simulation> {
     world.bodies.iter_mut().filter(|b| b.kind == BodyKind::Dynamic).for_each(|b| b.linear_velocity.y -= 1e-3);
     Simulation::with(world, settings::awake(settings_text.split_whitespace())?, Box::new(Reference::<f32>::new()))
 }
 
 struct Standing {
-    /// Time until a body left its place; none if all bodies stood for 20 s (s).
+    /// Time until a body left its place (s); `None` if all bodies stood for 20 s.
     fell: Option<f64>,
-    /// Largest horizontal distance of a body from its first position (m).
+    /// Largest horizontal distance of a body from its initial position (m).
     drift: f64,
     /// Root mean square speed at the end (m/s).
     rms_speed: f64,
@@ -87,7 +88,7 @@ fn stand(spec: &str, settings_text: &str) -> Result<Standing> {
 pub const RUNS: u64 = 9 + 3 + 16 + 4 + 4 + 8 + 8;
 
 impl RulesReport {
-    /// Adds a plot of named lines over time. A logarithmic scale leaves out values that are not above 0.
+    /// Adds a plot of named lines over time. A logarithmic scale leaves out values of 0 or less.
     fn picture(&mut self, file: &'static str, title: &str, (y, scale): (&str, Scale), lines: Vec<(String, Line)>) {
         let _ = writeln!(self.page, "\n![{file}](rules/{file})");
         let series = lines.into_iter().enumerate().map(|(look, (name, mut line))| {

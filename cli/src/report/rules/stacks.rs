@@ -17,8 +17,8 @@ pub(super) fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
     let page = &mut report.page;
     let _ = writeln!(
         page,
-        "\n## Clamping\n\nThe scene `misaligned` runs for 20 s with {SHEET}. A\n\
-         stack falls when a box is half a box away from its start.\n\n\
+        "\n## Clamping\n\nThe scene `misaligned` runs for 20 s with {SHEET}.\n\
+         A stack falls when a box is half a box away from its start.\n\n\
          | boxes | clamping | stands | drift | rms speed |\n|---|---|---|---|---|"
     );
     for n in [5, 10, 20] {
@@ -37,7 +37,7 @@ pub(super) fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
     Ok(())
 }
 
-/// The stabilizations with their settings; each has 16 sweeps per step.
+/// The stabilizations with their settings, each with 16 sweeps per step.
 const STABILIZATIONS: [(&str, &str); 3] = [
     ("none", "substeps=1 iterations=16 relax=0 stabilization=none"),
     ("baumgarte", "substeps=1 iterations=16 relax=0 stabilization=baumgarte"),
@@ -49,9 +49,9 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
     let mut lines = Vec::new();
     let _ = writeln!(
         report.page,
-        "\n## Stabilization\n\nA `tower` of 10 boxes runs for 20 s with 16 sweeps a step: one substep, or for `soft` 8 substeps of 1 +\n\
-         1 sweeps. *Energy added* is the largest rise of kinetic and potential energy above an earlier minimum.\n\
-         *Exit speed* is that of a box that starts 5 cm deep in the floor.\n\n\
+        "\n## Stabilization\n\nA `tower` of 10 boxes runs for 20 s with 16 sweeps a step: one substep, or for `soft` 8 substeps of 1 + 1 sweeps.\n\
+         *Energy added* is the largest rise of kinetic and potential energy above an earlier minimum. *Exit speed* is the speed\n\
+         of a box that starts 5 cm deep in the floor.\n\n\
          | stabilization | deepest after 1 s | after 20 s | energy added | rms speed at rest | exit speed |\n|---|---|---|---|---|---|"
     );
     for (rule, text) in STABILIZATIONS {
@@ -79,9 +79,9 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
         after_run();
     }
     report.page.push_str(
-        "\nWithout stabilization the first overlap stays. Baumgarte stabilization removes it and shakes the tower.\n\
-         The soft contact first overlaps by its stiffness. The preload, an offset of the spring (`preload_rate`),\n\
-         then lifts the tower, which adds the energy, and the tower rests.\n",
+        "\nWithout stabilization the first overlap stays. Baumgarte stabilization removes it and shakes the tower. The soft\n\
+         contact first overlaps by its stiffness. Its preload (`preload_rate`), an offset of the spring, then lifts the tower,\n\
+         which adds the energy, and the tower rests.\n",
     );
     let title = "Deepest overlap in a tower of 10 boxes";
     report.picture("stabilization.svg", title, ("overlap mm", Scale::Decades), lines);

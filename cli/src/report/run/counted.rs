@@ -1,4 +1,4 @@
-//! What comes and goes during a run, and what sensors count.
+//! Counts bodies that come and go during a run, and the visits of sensors.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use super::RunReport;
 use drystone::{BodyHandle, ColliderOf, Event, Simulation, World};
 use drystone_scenes::Spawners;
 
-/// How often bodies entered and left a sensor, and how many are inside.
+/// Numbers of bodies that entered and left a sensor, and that are inside.
 #[derive(Clone, Debug, Serialize)]
 pub struct SensorCount {
     /// Name of the body with the sensor, or its index if it has none.
@@ -18,7 +18,7 @@ pub struct SensorCount {
     of: ColliderOf,
 }
 
-/// The sensors of a world, which counted nothing yet.
+/// The sensors of a world, before any count.
 pub(super) fn of(world: &World) -> Vec<SensorCount> {
     let colliders = |body: BodyHandle| {
         (0..world.bodies[body.index()].colliders.len()).map(move |collider| ColliderOf { body, collider })
@@ -27,7 +27,7 @@ pub(super) fn of(world: &World) -> Vec<SensorCount> {
 }
 
 impl SensorCount {
-    /// None if the collider is gone or is no sensor.
+    /// `None` if the collider is gone or is not a sensor.
     fn new(world: &World, of: ColliderOf) -> Option<Self> {
         let body = world.body(of.body)?;
         let is_sensor = body.colliders.get(of.collider)?.sensor;
@@ -37,7 +37,7 @@ impl SensorCount {
 }
 
 impl RunReport {
-    /// Notes what came, what left, and what sensors told in the last step.
+    /// Records the bodies that came and left, and the sensor events of the last step.
     pub fn count(&mut self, simulation: &Simulation, spawners: &Spawners) {
         let (came, left) = (spawners.came(), spawners.left());
         if (came, left) != (self.came.unwrap_or(0), self.left.unwrap_or(0)) {

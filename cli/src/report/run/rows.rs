@@ -3,7 +3,7 @@
 use super::{RunReport, SensorCount};
 use drystone::stats::median;
 
-/// Most sensors of which each has a row.
+/// Up to this number of sensors, each one has a row.
 const MOST_SENSORS: usize = 20;
 
 impl RunReport {

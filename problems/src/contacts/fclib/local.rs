@@ -58,7 +58,7 @@ mod tests {
     use super::*;
     use crate::contacts::{ContactProblem, Operator, Problem};
 
-    /// u = W r + q of the boxes, by impulses one by one.
+    /// u = W r + q of the boxes: each unit impulse gives a column of W.
     fn delassus() -> (Sparse, Vec<f64>) {
         let problem = boxes();
         let operator = Operator::new(&problem);
@@ -107,7 +107,7 @@ mod tests {
             assert!(u.distance(expected) < 1e-12 * expected.length(), "contact {i}: {u}, not {expected}");
             assert_eq!(local.friction[i], problem.contacts[i].friction);
         }
-        // Contacts of different bodies are not coupled, least of all those of one color.
+        // Contacts of different bodies are not coupled, and contacts of one color never are.
         assert!(local.rows.iter().any(|row| row.len() < impulses.len()), "W is full");
         for color in local.colors() {
             let meets = |i: &u32| local.rows[*i as usize].iter().any(|(j, _)| j != i && color.contains(j));
@@ -115,7 +115,7 @@ mod tests {
         }
     }
 
-    /// A change of a file, and the dataset that the error must name.
+    /// A change of a file, and the text that the error must contain.
     #[test]
     fn a_bad_local_file_is_refused_in_one_line_that_names_the_dataset() {
         use Data::{Real, Whole};
@@ -131,10 +131,10 @@ mod tests {
             ("spacedim", Whole(vec![2]), "must be 3"),
             ("W/m", Whole(vec![size + 3]), "24 x 21: contacts have"),
             ("W/n", Whole(vec![size - 1]), "less than 20"),
-            ("W/nz", Whole(vec![-3]), "-3: is no form"),
+            ("W/nz", Whole(vec![-3]), "-3: must be -2, -1 or a count"),
             ("W/x", number("W/x", 0, -1.0), "contact 0: its diagonal [-1.0"),
             ("W/x", number("W/x", 3, f64::NAN), "number 3 is NaN"),
-            ("vectors/q", Real(vec![0.0; 20]), "[20], and 21 numbers"),
+            ("vectors/q", Real(vec![0.0; 20]), "[20], but 21 numbers"),
             ("vectors/mu", number("vectors/mu", 6, -0.5), "-0.5 of contact 6"),
         ] {
             let mut tree = good.clone();

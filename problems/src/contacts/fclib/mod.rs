@@ -156,7 +156,7 @@ fn mass_blocks(m: &Sparse) -> Result<Vec<Block>> {
     ensure(entries >= rows, || format!("{entries} entries for {rows} rows: a mass is missing"))?;
     let mut entries = vec![[[0.0; 6]; 6]; m.rows / 6];
     for &(row, column, x) in m.entries.iter().filter(|e| e.2 != 0.0) {
-        let message = || format!("({row}, {column}) ties two bodies: only rigid bodies can be read");
+        let message = || format!("({row}, {column}) couples two bodies: only rigid bodies can be read");
         ensure(row / 6 == column / 6, message)?;
         entries[row / 6][row % 6][column % 6] += x;
     }
@@ -203,7 +203,7 @@ impl Sides {
 fn contact_rows(h: &Sparse, rows: usize) -> Result<Vec<Sides>> {
     if h.rows != rows || !h.columns.is_multiple_of(3) {
         let (found, columns) = (h.rows, h.columns);
-        return Err(input!("{found} x {columns}: {rows} rows and 3 columns a contact are needed"));
+        return Err(input!("{found} x {columns}: must have {rows} rows, and 3 columns for each contact"));
     }
     let (entries, columns) = (h.entries.len(), h.columns);
     ensure(entries >= columns, || format!("{entries} entries for {columns} columns: a contact is empty"))?;
@@ -232,7 +232,7 @@ fn sides(rows: &[Rows]) -> Result<Sides> {
         }
     }
     match (sides.a, sides.b) {
-        (None, None) => Err(Error::input("no body")),
+        (None, None) => Err(Error::input("has no body")),
         (Some(a), Some(b))
             if (0..3).any(|k| (a.linear[k] + b.linear[k]).length() > TOLERANCE * b.linear[k].length()) =>
         {
@@ -262,7 +262,7 @@ fn rotations(bodies: usize, contacts: &[Sides]) -> Result<Vec<DMat3>> {
         levers[side.body].push(Lever { map: map(&side), outward: -side.linear[0] });
     }
     let of = |(i, levers): (usize, &Vec<Lever>)| {
-        rotation(levers).ok_or_else(|| input!("body {i}: its angular rows are not those of arms"))
+        rotation(levers).ok_or_else(|| input!("body {i}: its angular rows do not follow from lever arms"))
     };
     levers.iter().enumerate().map(of).collect()
 }

@@ -14,7 +14,7 @@ impl Tables {
     pub(super) fn open(bytes: Vec<u8>) -> Result<Self> {
         let length = bytes.len() as u64;
         let file = File::from_bytes(bytes).map_err(|e| input!("not a whole HDF5 file: {e}"))?;
-        // Otherwise a missing end would remain unnoticed, if it holds only optional data.
+        // Without this check, a missing end would go unnoticed if it holds only optional data.
         let whole = file.superblock().eof_address;
         ensure(length >= whole, || format!("not a whole HDF5 file: {length} of {whole} bytes"))?;
         Ok(Self { file })
@@ -70,7 +70,7 @@ impl Tables {
         let shape = dataset.shape().map_err(wrong)?;
         // Check before reading: a wrong size must not allocate memory.
         let found = shape.iter().try_fold(1_u64, |all, &n| all.checked_mul(n));
-        let message = || format!("{path}: has the shape {shape:?}, and {count} numbers are needed");
+        let message = || format!("{path}: has the shape {shape:?}, but {count} numbers are needed");
         ensure(found == Some(count as u64), message)?;
         let numbers = read(&dataset).map_err(wrong)?;
         ensure(numbers.len() == count, || format!("{path}: holds {} of {count} numbers", numbers.len()))?;
@@ -83,14 +83,14 @@ impl Tables {
         let path = |name: &str| format!("{group}/{name}");
         let size = |name: &str| {
             let number = self.number(&path(name))?;
-            usize::try_from(number).map_err(|_| input!("{}: {number}: is not a size", path(name)))
+            usize::try_from(number).map_err(|_| input!("{}: {number}: must be 0 or more", path(name)))
         };
         let (rows, columns) = (size("m")?, size("n")?);
         let form = self.number(&path("nz"))?;
         let (count, pointers) = match form {
             -1 => (size("nzmax")?, Some(columns)),
             -2 => (size("nzmax")?, Some(rows)),
-            nz => (usize::try_from(nz).map_err(|_| input!("{}: {nz}: is no form", path("nz")))?, None),
+            nz => (usize::try_from(nz).map_err(|_| input!("{}: {nz}: must be -2, -1 or a count", path("nz")))?, None),
         };
         let outer = self.whole(&path("p"), pointers.map_or(count, |n| n.saturating_add(1)))?;
         let inner = self.whole(&path("i"), count)?;

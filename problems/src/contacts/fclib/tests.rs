@@ -1,4 +1,4 @@
-//! Files as others write them, and files that are wrong.
+//! Files in the form that other programs write, and invalid files.
 
 use hdf5_pure::{FileBuilder, GroupBuilder};
 
@@ -14,7 +14,8 @@ pub(super) enum Data {
 /// The datasets of a file, by path within the global problem; `M/x` before another group begins.
 pub(super) type Tree = Vec<(&'static str, Data)>;
 
-/// Three boxes, one on the ground and two on it, of which one has one contact only; tangents that are not orthogonal.
+/// Three boxes, one on the ground and two on top of it. One of the upper boxes has only one contact. The tangents are
+/// not orthogonal.
 pub(super) fn boxes() -> ContactProblem {
     let free = Velocity { linear: DVec3::new(0.1, -0.2, -1.0), angular: DVec3::new(0.3, -0.7, 0.2) };
     let body = |mass: f64| {
@@ -121,7 +122,7 @@ pub(super) fn change<'a>(tree: &'a mut Tree, path: &str) -> &'a mut Data {
     &mut tree.iter_mut().find(|(at, _)| *at == path).expect(path).1
 }
 
-/// Every number that the two problems' contacts say: W_ij by impulses one by one, q, masses.
+/// Largest difference between the contact velocities of two problems, without impulses and under each unit impulse.
 fn difference(one: &ContactProblem, other: &ContactProblem) -> f64 {
     let mut worst: f64 = 0.0;
     let (one_op, other_op) = (Operator::new(one), Operator::new(other));
@@ -148,7 +149,7 @@ fn angular_parts_in_body_axes_give_the_same_problem() {
     assert!(worst < 1e-13, "{worst} m/s");
     for (c, r) in problem.contacts.iter().zip(&read.contacts) {
         assert_eq!((c.a, c.b, c.friction, c.offset, c.frame), (r.a, r.b, r.friction, r.offset, r.frame));
-        // The third body has one contact: its arm may be any that points out of it.
+        // The third body has only one contact, so any arm that points out of it fits.
         if c.a != Some(2) {
             assert!(c.r_a.distance(r.r_a) < 1e-13 && c.r_b.distance(r.r_b) < 1e-13, "{c:?} {r:?}");
         }
@@ -158,7 +159,8 @@ fn angular_parts_in_body_axes_give_the_same_problem() {
     assert!(difference(&other, &read) > 1e-8, "another inertia is seen");
 }
 
-/// Bodies with one contact each, whose arms fit with either sign: on the side that the normal points to, and on the other.
+/// Bodies with one contact each, on the side that the normal points to and on the other side. Either sign of an arm
+/// fits.
 #[test]
 fn arms_that_fit_either_way_point_out_of_their_bodies() {
     let mut problem = boxes();
@@ -168,7 +170,7 @@ fn arms_that_fit_either_way_point_out_of_their_bodies() {
     problem.contacts = vec![contact(None, Some(0), DVec3::ZERO, below), contact(Some(1), Some(2), above, below)];
     let read = ContactProblem::from_fclib(bytes(&tree(&problem), "fclib_global")).expect("read");
     for (c, r) in problem.contacts.iter().zip(&read.contacts) {
-        // The length is that of the file, and the normal of the frame comes out of a and into b.
+        // The length is that of the file, and the arms point along the normal on a and against it on b.
         for (was, is, out) in [(c.a.map(|_| c.r_a), r.r_a, 1.0), (c.b.map(|_| c.r_b), r.r_b, -1.0)] {
             let Some(was) = was else { continue };
             assert!((is.length() - was.length()).abs() < 1e-13 && out * is.dot(r.frame[0]) > 0.0, "{was} became {is}");
@@ -188,7 +190,7 @@ fn what_is_written_is_read_back() {
     assert_eq!(ContactProblem::from_fclib(nameless.to_fclib().expect("written")).expect("read").name, "");
 }
 
-/// The entries of a matrix in a file, sorted by column and row, and where each column or row begins.
+/// The entries of a matrix in a file, sorted by column and row, with the start of each column or row.
 fn compressed(tree: &Tree, by_row: bool) -> [Data; 3] {
     let numbers = |path: &str| match tree.iter().find(|(at, _)| *at == path) {
         Some((_, Data::Whole(x))) => x.clone(),
@@ -246,7 +248,7 @@ fn an_unsymmetric_inertia_is_data() {
     assert!((1e-9..1e-3).contains(&difference(&problem, &read)));
 }
 
-/// What is done to a file, and what the error must name.
+/// A change of a file, and the text that the error must contain.
 #[test]
 fn a_bad_file_is_refused_in_one_line_that_names_the_dataset() {
     use Data::{Real, Whole};
@@ -266,20 +268,20 @@ fn a_bad_file_is_refused_in_one_line_that_names_the_dataset() {
     for (path, data, named) in [
         ("spacedim", Whole(vec![2]), "must be 3"),
         ("M/m", Whole(vec![24]), "24 x 18"),
-        ("M/m", Whole(vec![-18]), "-18: is not a size"),
-        ("M/nz", Whole(vec![-3]), "-3: is no form"),
+        ("M/m", Whole(vec![-18]), "-18: must be 0 or more"),
+        ("M/nz", Whole(vec![-3]), "-3: must be -2, -1 or a count"),
         ("M/nz", Whole(vec![5]), "5 numbers are needed"),
         ("M/nz", Whole(vec![1, 2]), "1 numbers are needed"),
         ("M/i", index("M/i", 2, 18), "18: must be 0 or more and less than 18"),
         ("M/i", index("M/i", 2, -1), "-1: must be"),
-        ("M/i", index("M/i", 0, 7), "(7, 0) ties two bodies"),
+        ("M/i", index("M/i", 0, 7), "(7, 0) couples two bodies"),
         ("M/x", number("M/x", 0, 1.1), "body 0: its rows are not one mass"),
         ("M/x", number("M/x", 1, -9.0), "body 0: mass"),
         ("M/x", Real(vec![1.0; 3]), "[3]"),
         ("M/x", number("M/x", 4, f64::NAN), "number 4 is NaN"),
         ("H/m", Whole(vec![24]), "24 x 21"),
         ("H/n", Whole(vec![2_000_000_001]), "a contact is empty"),
-        ("H/x", number("H/x", 0, 7.5), "angular rows are not those of arms"),
+        ("H/x", number("H/x", 0, 7.5), "angular rows do not follow from lever arms"),
         ("H/p", index("H/p", 0, 20), "contact"),
         ("vectors/f", Real(vec![0.0; 17]), "[17], and 18 numbers"),
         ("vectors/w", Real(vec![0.0; 22]), "[22], and 21 numbers"),
@@ -293,7 +295,7 @@ fn a_bad_file_is_refused_in_one_line_that_names_the_dataset() {
         assert!(error.starts_with(&group) && error.contains(named) && error.lines().count() == 1, "{path}: {error}");
     }
     for missing in good.iter().map(|(path, _)| *path) {
-        // Room for entries beyond those that there are, which the first form does not use.
+        // Room for additional entries, which the first form does not use.
         if missing.ends_with("nzmax") {
             continue;
         }

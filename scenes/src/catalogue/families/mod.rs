@@ -124,16 +124,16 @@ impl Family {
     pub const fn summary(self) -> &'static str {
         match self {
             Self::Stacks => {
-                "4 to 40 boxes of random sizes, densities and turns, dropped by up to 0.2 % of their heights: they stand"
+                "4 to 40 boxes of random sizes, densities and rotations, dropped by up to 0.2 % of their heights: they stand"
             }
             Self::LeanedTowers => {
-                "2 to 30 equal boxes, each shifted the same way, to 80 % of what statics allows: they stand"
+                "2 to 30 equal boxes, each shifted the same way, to 80 % of the static limit: they stand"
             }
-            Self::Arches => "semicircles of 7 to 31 wedges, 1.1 times as thick as they must be or thicker: they stand",
+            Self::Arches => "semicircles of 7 to 31 wedges, 1.1 to 2 times as thick as statics requires: they stand",
             Self::CardHouses => {
-                "1 to 5 storeys of cards with 1.25 times the friction that they need or more: they stand"
+                "1 to 5 storeys of cards with at least 1.25 times the friction that they need: they stand"
             }
-            Self::PlankTowers => "1 to 8 storeys of planks, all loads straight above each other: they stand",
+            Self::PlankTowers => "1 to 8 storeys of planks, every load directly above its support: they stand",
             Self::Dominoes => {
                 "30 to 60 dominoes without friction between them: all fall, at the speed of a train that leans and pushes"
             }
@@ -144,7 +144,7 @@ impl Family {
                 "a block at 0.98 or 1.02 of the angle of friction: it stays, or slides with g (sin - mu cos)"
             }
             Self::PushedBlocks => {
-                "a block that 0.98 or 1.02 of the limit of friction pushes: it stays, or slides with 0.02 mu g"
+                "a block pushed with 0.98 or 1.02 of the friction limit: it stays, or slides with 0.02 mu g"
             }
             Self::Piles => "20 to 120 bodies of six shapes in a container: none leaves, and all come to rest",
         }
@@ -172,8 +172,8 @@ impl Family {
             Self::PushedBlocks => moving::pushed(draw, g),
             Self::Piles => (moving::pile(draw)?, Law::Settles),
         };
-        // A domino wave needs steps of a quarter of the time from one domino to the next. The law says nothing for
-        // longer steps.
+        // A domino wave needs steps of at most a quarter of the time from one domino to the next. The law does not hold
+        // for longer steps.
         let dt = if let Law::Topples { speed, .. } = law { dt.min(0.25 * dominoes::pitch(&scene) / speed) } else { dt };
         let time = match law {
             Law::Topples { speed, .. } => dominoes::time(&scene, speed, g),

@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use drystone::stages::math::rotation::about;
 use drystone::{Body, Result, Shape, World};
 
-/// Loads stay within this share of a face about its center: 10 % of its width is left at each edge.
+/// Loads stay within this share of a face around its center, so that 10 % of its width is left at each edge.
 const MIDDLE: f64 = 0.8;
 
 /// A floor that is large enough for every structure here.
@@ -42,8 +42,8 @@ impl Block {
 
 /// Boxes on top of each other, dropped through gaps of up to 0.2 % of their heights. The center of mass of every box is
 /// above the middle part of every face below it. A face is convex, so the center of mass of any group of these boxes is
-/// above it too. Statics asks this of the group above each face, both for a stack at rest and for a box that lands on
-/// boxes that already rest.
+/// above it too. Statics requires this of the group above each face, both for a stack at rest and for a box that lands
+/// on boxes at rest.
 pub(super) fn stack(draw: &mut Draw) -> Scene {
     let n = draw.whole(4, 40);
     let size = draw.log_uniform(0.1, 1.0);
@@ -157,7 +157,7 @@ mod tests {
         (1.0 - own.x.abs() / half.x).min(1.0 - own.z.abs() / half.z)
     }
 
-    /// Checks statics again, from the positions of the bodies.
+    /// Checks the statics independently, from the positions of the bodies.
     #[test]
     fn all_above_a_box_of_a_stack_bears_on_its_middle_and_on_that_of_the_next() {
         for seed in 0..50 {

@@ -1,4 +1,4 @@
-//! What a slot bears, in columns.
+//! The loads of slots, in columns.
 
 use super::super::super::StepScale;
 use super::super::super::rows::{ContactRow, ImpulseRow, MassRow};
@@ -9,19 +9,18 @@ use crate::effort::Effort;
 use crate::error::Result;
 use crate::saved::Columns;
 
-/// How the rows of a slot are written.
+/// How much of the rows of a slot is saved.
 #[derive(Clone, Copy, Default, PartialEq, PartialOrd)]
 pub(super) enum Rows {
     #[default]
-    /// They follow from the rest.
+    /// Nothing. They follow from the rest.
     Remade,
-    /// But for effective masses.
+    /// Only effective masses.
     Masses,
-    /// As they are.
+    /// All fields.
     All,
 }
 
-/// The columns of slots.
 const BITS: usize = 0;
 const LOADED: usize = 1;
 const NORMAL: usize = 2;
@@ -34,25 +33,25 @@ const MASS: usize = 9;
 const JAMS: usize = 11;
 pub(super) const COLUMNS: usize = 12;
 
-/// Preloads of contacts that bear nothing.
+/// Preloads of contacts without a load.
 const PRELOADS: [f32; 2] = [0.0, -0.0];
 
-/// What a slot bears, and of its rows what does not follow from its manifold.
+/// The load of a slot, and the fields of its rows that do not follow from its manifold.
 #[derive(Clone, Copy, Default)]
 pub(super) struct SlotLoads {
     pub rows: Rows,
-    /// One a point, and one of the patch.
+    /// One for each point, and one for the patch.
     pub impulses: [ImpulseRow; MAX_POINTS + 1],
     pub sag: f32,
     pub need: f32,
     pub preload: f32,
     pub share: f32,
-    /// Effective masses along the normal and the tangents, likewise.
+    /// Effective masses along the normal and along the tangents, in the same order.
     pub masses: [[f32; 2]; MAX_POINTS + 1],
     pub jams: bool,
 }
 
-/// What the guesses of [`SlotLoads::walk`] come from.
+/// The sources of the guesses in [`SlotLoads::walk`].
 pub(super) struct Sources<'a> {
     pub detector: &'a Detector,
     pub effort: &'a Effort,
@@ -62,7 +61,8 @@ pub(super) struct Sources<'a> {
 }
 
 impl SlotLoads {
-    /// Writes or reads it, for rows of so many points with the patch. Whether the rows stand as they are is known.
+    /// Writes or reads the load of a slot with `count` rows of points, including the patch. The caller already knows
+    /// whether `rows` is [`Rows::All`].
     pub fn walk(
         &mut self,
         slot: &Slot,
@@ -118,7 +118,8 @@ impl SlotLoads {
     }
 }
 
-/// Impulses. Those that are zero, whose friction has either sign, take less than a byte. How large they were within a step ends with it.
+/// Writes or reads impulses. Zero impulses take less than a byte, and keep the signs of their friction. Peaks are not
+/// saved, because they end with the step.
 fn walk_impulses(impulses: &mut [ImpulseRow], columns: &mut Columns) -> Result<()> {
     const IS_LOADED: u8 = 4;
     let signed = |bit: u8| if bit == 0 { 0.0_f32 } else { -0.0 };

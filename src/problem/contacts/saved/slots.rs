@@ -1,4 +1,4 @@
-//! The slots of contacts as bytes: most follow from the manifolds that have them.
+//! The slots of contacts as bytes. Most of them follow from their manifolds.
 
 use super::super::super::slots::{FREE, Slots, Write};
 use crate::collide::{Detector, NO_SLOT};
@@ -6,10 +6,10 @@ use crate::error::{Result, ensure};
 use crate::graph::{Edge, IMMOVABLE};
 use crate::saved::{Archive, Saved};
 
-/// A slot by its index, with what of it does not follow from its manifold.
+/// The index of a slot, with the fields that do not follow from its manifold.
 type OtherSlot = (u32, (Write, (bool, (f32, Edge))));
 
-/// Slots and edges, which are those of the manifolds of the detector; whether each has one.
+/// Writes or reads slots and edges. Returns whether each slot has a manifold of the detector.
 pub(super) fn walk_slots<A: Archive>(slots: &mut Slots, detector: &Detector, archive: &mut A) -> Result<Vec<bool>> {
     let Slots { all, edges, colliders, free, taken } = slots;
     let count = archive.count(all.len())?;
@@ -27,7 +27,7 @@ pub(super) fn walk_slots<A: Archive>(slots: &mut Slots, detector: &Detector, arc
             colliders[i] = pair.colliders;
         }
     }
-    // What waits for the next step, and what the last one left otherwise.
+    // Slots that wait for the next step, or that the last step left in another state.
     let mut others: Vec<OtherSlot> = Vec::new();
     if A::READS {
         (*all, *edges) = settled.into_iter().unzip();
@@ -60,7 +60,7 @@ pub(super) fn walk_slots<A: Archive>(slots: &mut Slots, detector: &Detector, arc
     Ok(is_taken)
 }
 
-/// Colors, in runs of slots that have the same one.
+/// Colors, in runs of slots with the same color.
 fn walk_colors<A: Archive>(edges: &mut [Edge], archive: &mut A) -> Result<()> {
     let mut rest = edges;
     while let Some(first) = rest.first() {
