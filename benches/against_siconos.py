@@ -33,7 +33,7 @@ import scipy.sparse.linalg
 
 TARGETS = [1e-2, 1e-4, 1e-8]
 TOLERANCES = [10.0**-k for k in range(1, 15)]
-MOST_ITERATIONS = 100_000
+MAX_ITERATIONS = 100_000
 LOCAL = ["NSGS", "ADMM", "NSN_AC", "NSN_AC_TEST", "NSN_FB", "NSN_NM", "PROX", "TFP", "ACLMFP", "SOCLCP", "VI_EG", "VI_FPP"]
 GLOBAL = ["NSGS_WR", "ADMM", "ADMM_WR", "NSN_AC_WR", "PROX_WR", "IPM", "ACLMFP"]
 
@@ -117,7 +117,7 @@ def solve(problem, form, name, blocks, limit, runs):
         for _ in range(3):
             options = sn.SolverOptions(getattr(sn, key))
             options.dparam[sn.SICONOS_DPARAM_TOL] = tolerance
-            options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = MOST_ITERATIONS
+            options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = MAX_ITERATIONS
             r, u, v = np.zeros(len(problem.q)), np.zeros(len(problem.q)), np.zeros(len(getattr(problem, "f", [])))
             start = time.perf_counter()
             if form == "global":

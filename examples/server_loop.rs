@@ -8,7 +8,7 @@ use drystone::{Body, BodyHandle, Result, Shape, Simulation, World};
 /// Length of a step (s).
 const STEP: f32 = 1.0 / 60.0;
 /// Most steps of one round: a server that was held up does not try to catch up with all of it.
-const MOST_STEPS: u32 = 4;
+const MAX_STEPS: u32 = 4;
 /// Steps between two states that are sent.
 const SEND_EVERY: u32 = 30;
 
@@ -37,7 +37,7 @@ pub fn run(steps: u32, mut send: impl FnMut(String)) -> Result<()> {
     let (mut time, mut step) = (0.0, 0);
     for round in 0.. {
         time += time_of_round(round);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             if time < STEP || step == steps {
                 break;
             }

@@ -29,7 +29,7 @@ const REGAINED: f64 = 1e-3;
 const ROUNDING: f64 = 1e-6;
 /// Largest number of substeps in a step for which rounding of velocities adds up. Shorter substeps sum changes, which
 /// round less.
-const MOST_ROUNDINGS: f64 = 16.0;
+const MAX_ROUNDINGS: f64 = 16.0;
 
 /// Share of its energy that an island with joints can gain in a step before it takes shorter substeps.
 const COARSE: f64 = 0.1;
@@ -540,7 +540,7 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let slack = REGAINED * after + rest;
     // Gravity causes the same rounding of a velocity in each substep. Short substeps sum changes, which round less.
     // Energy that constraints added does not count.
-    let rounding = after.min(before + pushed.max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MOST_ROUNDINGS);
+    let rounding = after.min(before + pushed.max(0.0)) * f64::from(f32::EPSILON) * (dt / substep).min(MAX_ROUNDINGS);
     Entry { before, after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
 }
 

@@ -18,7 +18,7 @@ use crate::math::rotation::product;
 use crate::world::{Body, BodyKind, World, placed, pose};
 
 /// Largest number of substeps that the settings accept.
-const MOST_SUBSTEPS: f64 = 4096.0;
+const MAX_SUBSTEPS: f64 = 4096.0;
 /// The bodies beneath a body share its load if their tops are within this distance of the highest top, relative to the
 /// height of the upper body.
 const LEVEL: f64 = 0.1;
@@ -118,13 +118,13 @@ impl Load {
             return Err(Error::input("a limit on penetration needs soft contacts: set stabilization=soft"));
         }
         let substeps = (self.overlap(1, dt, config) / most).sqrt().ceil().max(1.0);
-        if substeps <= MOST_SUBSTEPS {
+        if substeps <= MAX_SUBSTEPS {
             return Ok(substeps as u32);
         }
         let (upper, lower, force) = (self.upper, self.lower, self.force);
         Err(input!(
             "penetration of {:.3e} mm: body {upper} presses on body {lower} with {force:.3e} N, which asks for {substeps} \
-             substeps, more than {MOST_SUBSTEPS}; shorten the step",
+             substeps, more than {MAX_SUBSTEPS}; shorten the step",
             most * 1e3
         ))
     }

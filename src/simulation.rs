@@ -102,7 +102,7 @@ struct Unfinished {
 /// ```
 pub struct Simulation {
     /// The bodies, with moments of inertia raised if they are too small
-    /// ([`MassProperties::MOST_LEVERAGE`](crate::MassProperties::MOST_LEVERAGE)). The caller can change all of it
+    /// ([`MassProperties::MAX_LEVERAGE`](crate::MassProperties::MAX_LEVERAGE)). The caller can change all of it
     /// between steps: insert and remove bodies and joints, and set gravity, poses, velocities, forces, masses,
     /// materials, kinds and shapes. The next step finds the changes, and refuses a world that [`World::check`] refuses.
     /// Contacts keep their impulses, except those of a body that changed its kind or shapes.

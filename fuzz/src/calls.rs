@@ -10,8 +10,8 @@ use crate::run::Runs;
 use crate::{good, is_one_line, show};
 
 /// Largest numbers of bodies and calls: more of them find nothing new.
-const MOST_BODIES: usize = 16;
-const MOST_CALLS: usize = 32;
+const MAX_BODIES: usize = 16;
+const MAX_CALLS: usize = 32;
 
 #[derive(Arbitrary, Debug)]
 struct Program {
@@ -148,7 +148,7 @@ impl Game {
             Call::Steps(count) => (0..count % 32).for_each(|_| self.step(1.0 / 60.0)),
             Call::StepOf(dt) => self.step(dt.0),
             Call::Insert(body, in_first) => {
-                if self.bodies.len() < 2 * MOST_BODIES {
+                if self.bodies.len() < 2 * MAX_BODIES {
                     let (body, mut handles) = (body.body(), Vec::new());
                     self.runs.each(|simulation| {
                         let world = if *in_first { 0 } else { simulation.world.world_count() - 1 };
@@ -283,14 +283,14 @@ fn play(program: &Program) {
         world.gravity = ordinary;
     }
     let mut bodies = Vec::new();
-    for body in program.bodies.iter().take(MOST_BODIES) {
+    for body in program.bodies.iter().take(MAX_BODIES) {
         let handle = world.insert(body.body());
         match good(world.check()) {
             Some(()) => bodies.push(handle),
             None => _ = world.remove(handle),
         }
     }
-    for joint in program.joints.iter().take(MOST_BODIES).filter(|_| !bodies.is_empty()) {
+    for joint in program.joints.iter().take(MAX_BODIES).filter(|_| !bodies.is_empty()) {
         let [a, b] = joint.bodies.map(|k| bodies.get(usize::from(k) % (bodies.len() + 1)).copied());
         let handle = world.insert_joint(joint.joint(a.unwrap_or(bodies[0]), b));
         if good(world.check()).is_none() {
@@ -308,7 +308,7 @@ fn play(program: &Program) {
     let Some(runs) = Runs::new(&world, &config) else { return };
     let named = [bodies.len(), joints.len()];
     let mut game = Game { runs, bodies, joints, good: world, named };
-    program.calls.iter().take(MOST_CALLS).for_each(|call| game.call(call));
+    program.calls.iter().take(MAX_CALLS).for_each(|call| game.call(call));
     game.step(1.0 / 60.0);
 }
 

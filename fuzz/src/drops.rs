@@ -38,7 +38,7 @@ struct Thing {
 }
 
 const FLOOR: f32 = 12.0;
-const MOST_THINGS: usize = 8;
+const MAX_THINGS: usize = 8;
 /// The thickness of floors (m). No body moves further in a step.
 const THICKNESS: f32 = 1.0;
 
@@ -90,7 +90,7 @@ pub fn check(data: &[u8]) {
     let mut world = World::new();
     world.insert(drop.floor.body().friction(friction));
     let mut lowest = 0.0;
-    for thing in drop.things.iter().take(MOST_THINGS) {
+    for thing in drop.things.iter().take(MAX_THINGS) {
         let body = thing.body(&mut lowest).density(100.0 + 1e4 * density).friction(friction);
         world.insert(body.restitution(restitution));
     }

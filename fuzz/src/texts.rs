@@ -18,7 +18,7 @@ use drystone_scenes::{CATALOGUE, Scene, SceneFile};
 use crate::good;
 
 /// Largest number of bodies for a scene that is also stepped.
-const MOST_BODIES: usize = 200;
+const MAX_BODIES: usize = 200;
 
 /// Reads a file with these bytes and with a name that ends in `end`.
 fn from_file<T>(bytes: &[u8], end: &str, read: impl FnOnce(&Path) -> T) -> T {
@@ -38,7 +38,7 @@ pub fn scene(data: &[u8]) {
         assert_eq!(again.world.bodies.len(), bodies);
         assert_eq!(SceneFile::of(&again).expect("a scene").to_text(), written, "what is written is read as another");
     }
-    if bodies > MOST_BODIES {
+    if bodies > MAX_BODIES {
         return;
     }
     let config = SolverConfig::default().with(|c| c.max_substeps = 16);

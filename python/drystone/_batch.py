@@ -61,7 +61,7 @@ MEASURES = (
     "residual_dissipation",
 )
 # Largest side of a picture (pixels).
-MOST_PIXELS = 8192
+MAX_PIXELS = 8192
 LISTEN = ("contacts", "impulses", "hits")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
 
@@ -912,8 +912,8 @@ def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:
 
 def _side(name: str, pixels: Any) -> int:
     side = _check.whole(name, pixels, 1)
-    if side > MOST_PIXELS:
-        raise ValueError(f"{name} = {side}: must be at most {MOST_PIXELS}")
+    if side > MAX_PIXELS:
+        raise ValueError(f"{name} = {side}: must be at most {MAX_PIXELS}")
     return side
 
 

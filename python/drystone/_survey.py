@@ -32,16 +32,16 @@ ENGINES = ("auto", "here", "processes", "ray")
 
 # Target duration of a task: a shorter one has more overhead, and a longer one loses more work with its worker.
 TASK_SECONDS = 1.0
-MOST_RUNS_A_TASK = 4096
+MAX_RUNS_A_TASK = 4096
 # Additional duration for each task that runs at the same time, because the driver takes 2 ms for a task
 # (docs/cluster.md).
 SECONDS_A_TASK = 0.005
 # Simultaneous tasks of each worker: one that runs and one that waits.
 TASKS_A_WORKER = 2
 # Number of times that a run may end its worker.
-MOST_DEATHS = 3
+MAX_DEATHS = 3
 # Number of attempts of a check to find a worker other than that of the first run.
-MOST_SEARCHES = 5
+MAX_SEARCHES = 5
 
 
 class NotTheSame(RuntimeError):
@@ -313,7 +313,7 @@ class _Survey:
                 numbers, not_by, searches = running.pop(number)
                 if rows is None:
                     # The worker of the first run got this check: try again.
-                    other = not_by if searches < MOST_SEARCHES else None
+                    other = not_by if searches < MAX_SEARCHES else None
                     checks.append((numbers, other, searches + 1))
                     continue
                 if searches:
@@ -328,7 +328,7 @@ class _Survey:
 
     def _next(self, todo: deque[int], mean: float, room: int) -> Task:
         wanted = max(TASK_SECONDS, SECONDS_A_TASK * room)
-        size = self.chunk or min(MOST_RUNS_A_TASK, max(1, round(wanted / mean)) if mean else 1)
+        size = self.chunk or min(MAX_RUNS_A_TASK, max(1, round(wanted / mean)) if mean else 1)
         if self.chunk is None:
             # Near the end, every worker should still get a task.
             size = max(1, min(size, len(todo) // max(1, room)))
@@ -470,8 +470,8 @@ class _Processes:
         tasks = sorted(worker.tasks)
         for first in tasks[:1]:
             self.deaths[first] = self.deaths.get(first, 0) + 1
-            if self.deaths[first] >= MOST_DEATHS:
-                raise RuntimeError(f"a run ended its worker {MOST_DEATHS} times: {self.work[first]}")
+            if self.deaths[first] >= MAX_DEATHS:
+                raise RuntimeError(f"a run ended its worker {MAX_DEATHS} times: {self.work[first]}")
         worker.pool.shutdown(wait=False, cancel_futures=True)
         worker.pool, worker.machine = self._new_pool(), None
         worker.tasks = {number: worker.pool.submit(self.work[number]) for number in tasks}

@@ -228,7 +228,7 @@ class Env(gymnasium.Env[Floats, NDArray[Any]]):
         return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), infos
 
 
-HALF_POLE, MOST_ANGLE, MOST_WAY, PUSH = 0.5, 0.21, 2.4, 10.0
+HALF_POLE, MAX_ANGLE, MAX_WAY, PUSH = 0.5, 0.21, 2.4, 10.0
 
 
 def _cart_and_pole() -> Scene:
@@ -263,7 +263,7 @@ def cart_pole(
 
     def terminated(batch: Batch) -> NDArray[np.bool_]:
         way, _, angle, _ = observe(batch).T
-        fell: NDArray[np.bool_] = (np.abs(way) > MOST_WAY) | (np.abs(angle) > MOST_ANGLE)
+        fell: NDArray[np.bool_] = (np.abs(way) > MAX_WAY) | (np.abs(angle) > MAX_ANGLE)
         return fell
 
     def act(batch: Batch, actions: NDArray[Any]) -> None:

@@ -15,7 +15,7 @@ from ._batch import Batch, Snapshots
 from ._scene import Config, Scene
 
 # Number of times that one call may end its actor.
-MOST_DEATHS = 10
+MAX_DEATHS = 10
 
 
 class _Worlds:
@@ -151,7 +151,7 @@ class Fleet:
         return results
 
     def _get(self, share: _Share, call: tuple[str, tuple[Any, ...], dict[str, Any]], running: Any) -> Any:
-        for _ in range(MOST_DEATHS):
+        for _ in range(MAX_DEATHS):
             try:
                 return self._ray.get(running)
             except self._ray.exceptions.RayActorError:
@@ -163,7 +163,7 @@ class Fleet:
                 running = share.actor.do.remote(*call)
             except self._ray.exceptions.RayTaskError as error:
                 raise error.as_instanceof_cause() from None
-        raise RuntimeError(f"{call[0]} ended the actor of worlds {share.first} and on {MOST_DEATHS} times")
+        raise RuntimeError(f"{call[0]} ended the actor of worlds {share.first} and on {MAX_DEATHS} times")
 
     def _keep(self) -> None:
         """Keep bytes of all worlds after enough calls."""

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::catalogue::{CATALOGUE, MOST_BODIES};
+use super::catalogue::{CATALOGUE, MAX_BODIES};
 #[cfg(feature = "serde")]
 use super::file::load;
 use super::scene::{Group, Scene};
@@ -52,9 +52,9 @@ impl Scene {
         let mut all = Self::find(name_or_path, parameters)?;
         let each = all.world.dynamic_count();
         // A world without dynamic bodies also takes memory and time.
-        ensure(count > 0 && each.max(1).saturating_mul(count) <= MOST_BODIES as usize, || {
+        ensure(count > 0 && each.max(1).saturating_mul(count) <= MAX_BODIES as usize, || {
             format!(
-                "{count} worlds of {each} dynamic bodies: must be at least one world, at most {MOST_BODIES} worlds, and at most {MOST_BODIES} such bodies in all"
+                "{count} worlds of {each} dynamic bodies: must be at least one world, at most {MAX_BODIES} worlds, and at most {MAX_BODIES} such bodies in all"
             )
         })?;
         let vary = vary.map(|key| Ok((key, whole(name_or_path, parameters, key)?))).transpose()?;
@@ -74,11 +74,9 @@ impl Scene {
             let varied = [parameters, &[format!("{key}={}", begin + k as f64)]].concat();
             let next = Self::find(name_or_path, &varied)?;
             dynamic += next.world.dynamic_count();
-            ensure(dynamic <= MOST_BODIES as usize, || {
+            ensure(dynamic <= MAX_BODIES as usize, || {
                 let worlds = k + 1;
-                format!(
-                    "{worlds} of {count} worlds have {dynamic} dynamic bodies: must be at most {MOST_BODIES} in all"
-                )
+                format!("{worlds} of {count} worlds have {dynamic} dynamic bodies: must be at most {MAX_BODIES} in all")
             })?;
             all.beside(&next);
         }

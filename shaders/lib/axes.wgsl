@@ -10,7 +10,7 @@ fn relative_turn(pair: ptr<function, Pair>) -> vec3f {
 }
 
 // Distances below the root of this have no direction (m^2).
-const LEAST_SQUARE: f32 = 1e-12;
+const MIN_SQUARE: f32 = 1e-12;
 
 struct AnchorMotion { now: vec3f, longer: f32 }
 
@@ -19,7 +19,7 @@ struct AnchorMotion { now: vec3f, longer: f32 }
 fn along_anchors(carried: vec3f, shift: vec3f, length: f32) -> AnchorMotion {
     let apart = carried * length + shift;
     let square = dot3(apart, apart);
-    let has_direction = length > 0.0 && square > LEAST_SQUARE;
+    let has_direction = length > 0.0 && square > MIN_SQUARE;
     let now = select(carried, apart * inverse_sqrt(square), has_direction);
     // This form avoids the cancellation of a difference of two lengths, unless the anchors passed each other.
     let cosine = dot3(carried, now);
@@ -73,16 +73,16 @@ fn axis_inverse_mass(pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
 }
 
 // Rows that are no limits are more than this above their upper limit (m, rad).
-const LEAST_LEFT: f32 = -5e17;
+const MIN_LEFT: f32 = -5e17;
 
 // Whether a row is a lock: neither a limit nor a drive.
-fn is_lock(axis: Axis) -> bool { return LEAST_LEFT > axis.left && 0.5 > axis.mass_scale + axis.impulse_scale; }
+fn is_lock(axis: Axis) -> bool { return MIN_LEFT > axis.left && 0.5 > axis.mass_scale + axis.impulse_scale; }
 
 // Position relative to the nearer of the two limits of an axis.
 struct NearerLimit { is_limit: bool, is_upper: bool, gap: f32, apart: bool }
 
 fn nearer_limit(axis: Axis, motion: AxisMotion) -> NearerLimit {
-    let is_limit = axis.left > LEAST_LEFT;
+    let is_limit = axis.left > MIN_LEFT;
     let place = axis.gap + motion.moved;
     let left = axis.left - motion.moved;
     let is_upper = is_limit && place > left;

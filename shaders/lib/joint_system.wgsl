@@ -2,7 +2,7 @@
 // src/kernels/joint_system.rs.
 
 // The smallest pivot of a row, relative to the trace of its block in S: 2^-20.
-const LEAST_PIVOT: f32 = 9.5367431640625e-7;
+const MIN_PIVOT: f32 = 9.5367431640625e-7;
 
 // The lists of the systems in their common buffer. Its first numbers are the starts of the lists. Layout:
 // src/backend/gpu/rows.rs.
@@ -77,7 +77,7 @@ fn factored_pivot(pivot: mat3x3f, own: vec3f) -> mat3x3f {
     let x = pivot[0];
     let y = pivot[1];
     let z = pivot[2];
-    let least = (own.x + own.y + own.z) * LEAST_PIVOT;
+    let least = (own.x + own.y + own.z) * MIN_PIVOT;
     let d_x = inverse_of_row(x.x, least, own.x);
     let l_xy = x.y * d_x;
     let l_xz = x.z * d_x;

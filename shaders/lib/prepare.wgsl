@@ -1,6 +1,6 @@
 // Effective masses of contact points. Twins: src/problem/arithmetic.rs.
 
-const LEAST_JAMMING: f32 = 0.53;
+const MIN_JAMMING: f32 = 0.53;
 
 fn inverse_or_zero(x: f32) -> f32 {
     let is_positive = x > 0.0;
@@ -50,7 +50,7 @@ fn jamming(friction: f32, parted: f32, pressed_1: f32, pressed_2: f32) -> f32 {
     let scaled_2 = pressed_2 * scale;
     let pressed = square_root(scaled_1 * scaled_1 + scaled_2 * scaled_2);
     let ratio = friction * pressed * inverse_or_zero(parted * scale);
-    return select(0.0, ratio, friction > LEAST_JAMMING);
+    return select(0.0, ratio, friction > MIN_JAMMING);
 }
 
 fn normal_step(ratio: f32) -> f32 { return select(1.0, inverse_or_zero(1.0 + ratio), ratio > 1.0); }
@@ -70,7 +70,7 @@ fn point_masses(tangents: bool, frame: Contact, a: Mass, b: Mass, r_a: vec3f, r_
     let t_2 = cross3(n, t_1);
     let parted = entry(a, b, r_a, r_b, n, n);
     var result = PointMasses(inverse_or_zero(parted), 0.0, 0.0);
-    if frame.friction > LEAST_JAMMING {
+    if frame.friction > MIN_JAMMING {
         let pressed_1 = entry(a, b, r_a, r_b, n, t_1);
         result.jamming = jamming(frame.friction, parted, pressed_1, entry(a, b, r_a, r_b, n, t_2));
         result.normal = result.normal * normal_step(result.jamming);

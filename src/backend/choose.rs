@@ -74,7 +74,7 @@ impl BackendKind {
 }
 
 /// Scenes with fewer dynamic bodies run on the processor: opening a GPU takes longer than their steps.
-const LEAST_BODIES: usize = 500;
+const MIN_BODIES: usize = 500;
 
 #[cfg(not(feature = "gpu"))]
 const WITHOUT_GPU: &str = "drystone was built without the feature gpu";
@@ -104,8 +104,8 @@ pub fn choose(choice: BackendChoice, dynamic_bodies: usize, exact: bool) -> Resu
             let why = format!("gpu: requested; {}", gpu.adapter());
             Ok((gpu, why))
         }
-        BackendChoice::Auto if dynamic_bodies < LEAST_BODIES => {
-            Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies; a GPU is considered from {LEAST_BODIES} bodies on")))
+        BackendChoice::Auto if dynamic_bodies < MIN_BODIES => {
+            Ok(cpu(format!("cpu: {dynamic_bodies} dynamic bodies; a GPU is considered from {MIN_BODIES} bodies on")))
         }
         BackendChoice::Auto => match fastest(dynamic_bodies, exact)? {
             (Some(gpu), why) => Ok((gpu, format!("gpu: {why}"))),

@@ -18,7 +18,7 @@ use crate::world::World;
 pub(super) const WORLDS: usize = 16;
 /// A world with more rows of bodies than this fills the lanes by itself. In a group it would evict others from the
 /// cache.
-const MOST_BODIES: usize = 160;
+const MAX_BODIES: usize = 160;
 
 /// Several steps combined into one, in reusable memory.
 #[derive(Default)]
@@ -92,7 +92,7 @@ impl Group {
     fn run_alike<T>(&mut self, jobs: &mut [(&mut T, &mut Member)], stages: &mut [Stage]) {
         let small = |(member, stage): (&Member, &Stage)| {
             let simulation = member.simulation();
-            let is_small = *stage == Stage::Assembled && simulation.problem().bodies.len() <= MOST_BODIES;
+            let is_small = *stage == Stage::Assembled && simulation.problem().bodies.len() <= MAX_BODIES;
             is_small.then(|| Alike::of(simulation.config(), simulation.problem())).flatten()
         };
         let alike: Vec<Option<Alike>> =

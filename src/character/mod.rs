@@ -22,7 +22,7 @@ use crate::config::check_step_length;
 use crate::error::{Result, ensure, input};
 use crate::queries::Hit;
 use crate::simulation::Simulation;
-use crate::world::{BodyHandle, BodyKind, MOST_SPEED, World};
+use crate::world::{BodyHandle, BodyKind, MAX_SPEED, World};
 use surroundings::{Footing, Glide, Surroundings, Touch};
 
 /// A character that walks through a world. It moves a kinematic body, for example a capsule.
@@ -302,8 +302,8 @@ impl Character {
         within("margin", self.margin, (1e-3, 1.0))?;
         within("mass", self.mass, (0.0, 1e15))?;
         within("push_force", self.push_force, (0.0, f32::MAX))?;
-        let is_speed = [velocity, self.drift].iter().all(|v| v.abs().cmple(Vec3::splat(MOST_SPEED)).all());
-        ensure(is_speed, || format!("velocity = {velocity}: must be at most {MOST_SPEED:e} in size"))
+        let is_speed = [velocity, self.drift].iter().all(|v| v.abs().cmple(Vec3::splat(MAX_SPEED)).all());
+        ensure(is_speed, || format!("velocity = {velocity}: must be at most {MAX_SPEED:e} in size"))
     }
 }
 

@@ -20,7 +20,7 @@ use crate::lanes::InstructionSet;
 const FAR: f32 = 0.5;
 /// Largest rotation of a body in a step for which contacts with a half-space are predicted over the body's whole path
 /// (rad).
-const MOST_TURN: f32 = 0.5;
+const MAX_TURN: f32 = 0.5;
 /// Bound of the angular acceleration of a free body, divided by the square of its spin. The moments of inertia about
 /// two axes differ by no more than the third moment, so no coefficient in Euler's three equations exceeds 1.
 const SWERVE: f32 = 0.58;
@@ -61,7 +61,7 @@ impl Narrow<'_> {
         let turn = dt * (a.w.length() + b.w.length());
         let goes = approach > TOUCHING * size && approach < FARTHEST && (track.unbounded == 0.0 || turn > 0.0);
         // The plane of a half-space contact is valid at any distance.
-        let is_near = track.unbounded != 0.0 && turn <= MOST_TURN;
+        let is_near = track.unbounded != 0.0 && turn <= MAX_TURN;
         goes.then_some(Going { approach: if is_near { 0.0 } else { approach }, size })
     }
 

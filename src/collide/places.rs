@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::collider::{is_in_range, is_placed};
 use super::tree::{NOWHERE, Tree};
-use crate::world::{Collider, MOST_LENGTH, World, placed, pose};
+use crate::world::{Collider, MAX_LENGTH, World, placed, pose};
 
 /// A collider: its body, and its index there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,11 +18,11 @@ pub(crate) struct Place {
 
 impl Place {
     /// The collider and its pose in the world. Returns `None` if it was removed, or is farther away than
-    /// [`MOST_LENGTH`].
+    /// [`MAX_LENGTH`].
     pub fn find(self, world: &World) -> Option<(&Collider, Pose)> {
         let body = world.bodies.get(self.body as usize)?;
         let collider = body.colliders.get(self.collider as usize)?;
-        is_placed(body.position, body.rotation, MOST_LENGTH)
+        is_placed(body.position, body.rotation, MAX_LENGTH)
             .then(|| (collider, placed(pose(body.position, body.rotation), pose(collider.position, collider.rotation))))
     }
 }

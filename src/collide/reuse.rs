@@ -21,7 +21,7 @@ const RECYCLE_TURN_KINEMATIC: f32 = 1e-6;
 
 /// Largest rotation of a body in a step for which contacts with planes are predicted over the body's whole path (rad).
 /// The rod at 1000 rad/s (H7) turns by 17 rad.
-const MOST_FORESEEN_TURN: f32 = 0.5;
+const MAX_FORESEEN_TURN: f32 = 0.5;
 
 /// Results of the test for sixteen pairs.
 #[derive(Clone, Copy, Default, PartialEq)]
@@ -90,7 +90,7 @@ impl ReuseTest<'_> {
         let base = number(f64::from(self.margins.speculative)) * size + number(f64::from(self.margins.fall));
         // A contact with a plane is valid at any distance. Other far contacts would stop bodies that pass by. Arms stay
         // the same within a step.
-        let is_far_seen = L::and(unbounded.gt(zero), number(f64::from(MOST_FORESEEN_TURN)).gt(length(w_b) * dt));
+        let is_far_seen = L::and(unbounded.gt(zero), number(f64::from(MAX_FORESEEN_TURN)).gt(length(w_b) * dt));
         let farthest = L::select(two * size, number(f64::from(f32::MAX)), is_far_seen);
         let prediction = base + L::smaller(approach * dt, farthest);
 
@@ -174,7 +174,7 @@ mod tests {
         let size = track.size;
         let approach = (b.v - a.v).length() + track.reach_b * (b.w - a.w).length();
         let base = margins.speculative * size + margins.fall;
-        let is_far_seen = track.unbounded != 0.0 && b.w.length() * margins.dt < MOST_FORESEEN_TURN;
+        let is_far_seen = track.unbounded != 0.0 && b.w.length() * margins.dt < MAX_FORESEEN_TURN;
         let farthest = if is_far_seen { f32::MAX } else { 2.0 * size };
         let prediction = base + (approach * margins.dt).min(farthest);
         let since = |now: &BodyState, then: &Placed| {

@@ -20,7 +20,7 @@ const ALONE: usize = 3;
 /// If leaves stretch to more than this multiple of their length at the last arrangement, the boxes are arranged again.
 const STRETCH: f32 = 1.2;
 /// Largest weight of one leaf: a box that flew far away does not represent the others.
-const MOST_STRETCH: f32 = 16.0;
+const MAX_STRETCH: f32 = 16.0;
 /// Capacity of the search stack: three nodes of each level above the leaves (15 levels for 2^32 boxes), and one more.
 const WAITING: usize = 64;
 /// If one box in this many is far from its arranged place, the boxes are arranged again.
@@ -87,7 +87,7 @@ impl Node {
     fn stretch(&self) -> f32 {
         let sides = |axis: usize| (self.maxs[axis] - self.mins[axis]).max(Vec4::ZERO);
         let boxes = (sides(0) + sides(1) + sides(2)).element_sum();
-        if boxes == 0.0 { 1.0 } else { (length(&self.around()) / boxes).min(MOST_STRETCH) }
+        if boxes == 0.0 { 1.0 } else { (length(&self.around()) / boxes).min(MAX_STRETCH) }
     }
 }
 

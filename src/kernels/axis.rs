@@ -35,7 +35,7 @@ pub fn relative_turn<L: Lane>(pair: &Pair<L>) -> Vec3<L> {
 }
 
 /// Distances below the root of this have no direction (m²).
-const LEAST_SQUARE: f64 = 1e-12;
+const MIN_SQUARE: f64 = 1e-12;
 
 /// The direction between the anchors, and the growth of their distance since the step began, after a shift of the
 /// anchor of a. Without a length the direction is the carried one.
@@ -43,7 +43,7 @@ const LEAST_SQUARE: f64 = 1e-12;
 fn along_anchors<L: Lane>(carried: Vec3<L>, shift: Vec3<L>, length: L) -> (Vec3<L>, L) {
     let apart = carried * length + shift;
     let square = dot3(apart, apart);
-    let has_direction = L::and(length.gt(L::constant(0.0)), square.gt(L::constant(LEAST_SQUARE)));
+    let has_direction = L::and(length.gt(L::constant(0.0)), square.gt(L::constant(MIN_SQUARE)));
     let now = select3(carried, apart * square.inverse_sqrt(), has_direction);
     // This form avoids the cancellation of a difference of two lengths, unless the anchors passed each other.
     let cosine = dot3(carried, now);
@@ -107,13 +107,13 @@ pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, axis: &Axi
 }
 
 /// Rows that are no limits are more than this above their upper limit (m, rad). It is half of `NO_LIMIT`.
-const LEAST_LEFT: f64 = -5e17;
+const MIN_LEFT: f64 = -5e17;
 
 /// Whether a row is a lock: neither a limit nor a drive.
 #[inline(always)]
 pub fn is_lock<L: Lane>(axis: &Axis<L>) -> L::Mask {
     let of_drive = axis.mass_scale + axis.impulse_scale;
-    L::and(L::constant(LEAST_LEFT).gt(axis.left), L::constant(0.5).gt(of_drive))
+    L::and(L::constant(MIN_LEFT).gt(axis.left), L::constant(0.5).gt(of_drive))
 }
 
 /// Position relative to the nearer of the two limits of an axis.
@@ -131,7 +131,7 @@ pub(super) struct NearerLimit<L: Lane> {
 impl<L: Lane> NearerLimit<L> {
     #[inline(always)]
     pub fn of(axis: &Axis<L>, motion: &AxisMotion<L>) -> Self {
-        let is_limit = axis.left.gt(L::constant(LEAST_LEFT));
+        let is_limit = axis.left.gt(L::constant(MIN_LEFT));
         let (place, left) = (axis.gap + motion.moved, axis.left - motion.moved);
         let is_upper = L::and(is_limit, place.gt(left));
         let gap = L::select(place, left, is_upper);

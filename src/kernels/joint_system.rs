@@ -173,7 +173,7 @@ impl<L: Lane> Block<L> {
 /// The smallest pivot of a row, relative to the trace of its block in S: 2^-20, above the rounding errors of the
 /// products that are subtracted from a pivot. A smaller pivot is raised to this, so corrections are too small, never
 /// too large.
-const LEAST_PIVOT: f64 = 9.536_743_164_062_5e-7;
+const MIN_PIVOT: f64 = 9.536_743_164_062_5e-7;
 
 /// One over a pivot of at least `least`; 0 for a row whose diagonal was zero in S.
 #[inline(always)]
@@ -189,7 +189,7 @@ fn inverse_pivot<L: Lane>(pivot: L, own: L, least: L) -> L {
 pub fn factored_pivot<L: Lane>(pivot: &Block<L>, own: Vec3<L>) -> Block<L> {
     let zero = L::constant(0.0);
     let [x, y, z] = [pivot.column(0), pivot.column(1), pivot.column(2)];
-    let least = (own.x + own.y + own.z) * L::constant(LEAST_PIVOT);
+    let least = (own.x + own.y + own.z) * L::constant(MIN_PIVOT);
     let d_x = inverse_pivot(x.x, own.x, least);
     let (l_xy, l_xz) = (x.y * d_x, x.z * d_x);
     let d_y = inverse_pivot(y.y - l_xy * x.y, own.y, least);

@@ -34,7 +34,7 @@ pub struct Mass<L> {
 
 /// No solid of even density jams with friction up to this. A point at the distance r from the center of such a solid
 /// has m r²/I <= 15, and with that ratio friction below 8/15 jams no point (docs/derivation.md, section 6).
-pub const LEAST_JAMMING: f32 = 0.53;
+pub const MIN_JAMMING: f32 = 0.53;
 
 /// 1/x, to half an ulp for most x; 0 if x is not positive.
 #[inline(always)]
@@ -91,14 +91,14 @@ pub fn tangent_mass<L: Lane>(s_11: L, s_22: L, s_12: L) -> L {
 /// The ratio of two changes of the normal velocity by a unit normal impulse: the largest change by its friction, over
 /// the change by the impulse itself. Above a ratio of 1, sliding friction can press the surfaces together faster than
 /// the normal impulse parts them (Painlevé). `parted` is the normal entry, and `pressed_1` and `pressed_2` are the
-/// entries of the normal with each tangent. The ratio is 0 for friction up to [`LEAST_JAMMING`].
+/// entries of the normal with each tangent. The ratio is 0 for friction up to [`MIN_JAMMING`].
 #[inline(always)]
 pub fn jamming<L: Lane>(friction: L, parted: L, pressed_1: L, pressed_2: L) -> L {
     let scale = parted.inverse_power();
     let (pressed_1, pressed_2) = (pressed_1 * scale, pressed_2 * scale);
     let pressed = square_root(pressed_1 * pressed_1 + pressed_2 * pressed_2);
     let ratio = friction * pressed * inverse_or_zero(parted * scale);
-    L::select(L::constant(0.0), ratio, friction.gt(L::constant(LEAST_JAMMING.into())))
+    L::select(L::constant(0.0), ratio, friction.gt(L::constant(MIN_JAMMING.into())))
 }
 
 /// The share of a normal step that a sweep takes. If friction changes the normal velocity more than the normal impulse
@@ -138,7 +138,7 @@ pub struct PointMasses<L> {
 }
 
 /// The effective masses of a point at the arms `r_a` and `r_b`. `tangents`: friction has two directions. `jams`: some
-/// surface has more friction than [`LEAST_JAMMING`].
+/// surface has more friction than [`MIN_JAMMING`].
 #[inline(always)]
 pub fn point_masses<L: Lane>(
     tangents: bool,

@@ -19,7 +19,7 @@ use super::effective::InverseMass;
 use super::rows::{AxisRow, JointRow, MassRow, NO_LIMIT};
 use super::softness::softness;
 use super::{NodeRow, StepProblem};
-use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, LEAST_DISTANCE, Linear, World};
+use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, Linear, MIN_DISTANCE, World};
 
 /// The solver integrates springs that turn by more than this in a substep (rad) implicitly, which takes energy away.
 /// Otherwise several such springs on one body would gain energy.
@@ -123,7 +123,7 @@ pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rat
         let row = AxisRow {
             direction: motion.direction[i].to_array(),
             is_linear: if i < 3 { 1.0 } else { 0.0 },
-            length: if is_distance && i == 0 && position > LEAST_DISTANCE { position } else { 0.0 },
+            length: if is_distance && i == 0 && position > MIN_DISTANCE { position } else { 0.0 },
             left: NO_LIMIT,
             max_impulse: f32::MAX,
             ..AxisRow::default()

@@ -13,7 +13,7 @@ use crate::math::rotation::{product, unit};
 use crate::world::{Body, BodyKind, World};
 
 /// Least number of bodies in one task.
-pub(super) const LEAST_BODIES: usize = 256;
+pub(super) const MIN_BODIES: usize = 256;
 
 /// Begins the problem of a step with the parameters and the rows of bodies. Bodies that are `asleep` get the rows of
 /// bodies that nothing moves.
@@ -38,7 +38,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: 
         let velocity = |v: Vec3| if moves { v.to_array() } else { [0.0; 3] };
         BodyRow { v: velocity(b.linear_velocity), w: velocity(b.allowed_spin(b.angular_velocity)), ..BodyRow::AT_REST }
     };
-    world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(state).collect_into_vec(&mut problem.bodies);
+    world.bodies.par_iter().with_min_len(MIN_BODIES).enumerate().map(state).collect_into_vec(&mut problem.bodies);
     let has_torques = AtomicBool::new(false);
     let mass = |(index, b): (usize, &Body)| {
         if b.kind != BodyKind::Dynamic || rests(index) {
@@ -50,7 +50,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: 
         let acceleration = (world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array();
         MassRow { acceleration, ..mass_row(b) }
     };
-    world.bodies.par_iter().with_min_len(LEAST_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);
+    world.bodies.par_iter().with_min_len(MIN_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);
     problem.torques.clear();
     if has_torques.into_inner() {
         let torque = |(i, b): (usize, &Body)| {
@@ -94,7 +94,7 @@ pub(super) fn mass_row(body: &Body) -> MassRow {
 /// Writes poses and velocities into the world, except for bodies that are asleep. Impulses stay in their rows for the
 /// next step.
 pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
-    let bodies = world.bodies.as_mut_slice().par_iter_mut().with_min_len(LEAST_BODIES).zip(&problem.bodies);
+    let bodies = world.bodies.as_mut_slice().par_iter_mut().with_min_len(MIN_BODIES).zip(&problem.bodies);
     bodies.enumerate().for_each(|(i, (body, row))| {
         if body.kind == BodyKind::Fixed || asleep.get(i) == Some(&true) {
             return;

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use super::StepProblem;
-use super::rows::{JointRow, MOST_AXES};
+use super::rows::{JointRow, MAX_AXES};
 use crate::collide::MAX_POINTS;
 use crate::error::{Error, Result};
 
@@ -141,8 +141,8 @@ impl StepProblem {
         let mut owner = vec![u32::MAX; self.axes.len()];
         for &row in self.rows_of(&self.joint_colors()) {
             let JointRow { first_axis, axis_count, .. } = self.joints[row as usize];
-            if axis_count as usize > MOST_AXES {
-                return refuse(format_args!("joints[{row}].axis_count = {axis_count}: must be at most {MOST_AXES}"));
+            if axis_count as usize > MAX_AXES {
+                return refuse(format_args!("joints[{row}].axis_count = {axis_count}: must be at most {MAX_AXES}"));
             }
             let (first, end) = (first_axis as usize, first_axis as usize + axis_count as usize);
             let Some(own) = owner.get_mut(first..end) else {

@@ -6,9 +6,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::StepProblem;
-use super::bodies::LEAST_BODIES;
+use super::bodies::MIN_BODIES;
 use super::carry::{Carry, NO_POINT, Preload, Written};
-use super::effective::LEAST_JAMMING;
+use super::effective::MIN_JAMMING;
 use super::points_a_slot;
 use super::prepare::{ComputedRow, PoseRow};
 use super::rows::{BodyRow, ContactRow, ImpulseRow, PointRow, Substep};
@@ -75,7 +75,7 @@ crate::saved::cloned!(ContactRows {
 struct Materials {
     /// Whether any surface bounces.
     bounce: bool,
-    /// Whether any surface has more friction than [`LEAST_JAMMING`].
+    /// Whether any surface has more friction than [`MIN_JAMMING`].
     may_jam: bool,
 }
 
@@ -85,7 +85,7 @@ impl Materials {
     fn among(all: impl Iterator<Item = Material> + Clone) -> Self {
         Self {
             bounce: all.clone().any(|material| material.restitution > 0.0),
-            may_jam: all.clone().any(|material| material.friction > LEAST_JAMMING),
+            may_jam: all.clone().any(|material| material.friction > MIN_JAMMING),
         }
     }
 
@@ -420,7 +420,7 @@ impl ContactRows {
             pad: 0.0,
             rotation: body.rotation.to_array(),
         };
-        world.bodies.par_iter().with_min_len(LEAST_BODIES).map(pose).collect_into_vec(poses);
+        world.bodies.par_iter().with_min_len(MIN_BODIES).map(pose).collect_into_vec(poses);
         let effort_changes = *classes != effort.classes();
         if effort_changes {
             classes.clear();

@@ -81,7 +81,7 @@ impl LeftToSweeps {
 
 /// Most products of blocks for each node. A chain of balls has 1, a ring 3, and a ladder with two joints at each seam
 /// 6. A sheet of 16 x 16 balls has 100, where more substeps are cheaper.
-const MOST_TERMS_A_NODE: usize = 24;
+const MAX_TERMS_A_NODE: usize = 24;
 
 /// Stands for the system of a joint that is swept.
 const SWEPT: u32 = u32::MAX;
@@ -210,7 +210,7 @@ impl JointRows {
         let of_joint = |&joint: &u32| axes::nodes(&self.joints[joint as usize]).map(move |rows| (joint, rows));
         let nodes: Vec<_> = joints.iter().flat_map(of_joint).collect();
         let most_terms = match config.joint_solver {
-            JointSolver::Auto => MOST_TERMS_A_NODE * nodes.len(),
+            JointSolver::Auto => MAX_TERMS_A_NODE * nodes.len(),
             _ => usize::MAX,
         };
         let system = problem.systems.len() as u32;

@@ -38,7 +38,7 @@ pub use rescale::StepScale;
 pub(crate) use rows::points_a_slot;
 pub use rows::{
     AxisRow, BodyRow, ContactRow, ConvergenceRow, DampingRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow,
-    JointRow, MOST_AXES, MassRow, MomentumRow, NO_LIMIT, Params, PassRow, PointRow, Softness, Substep, TorqueRow,
+    JointRow, MAX_AXES, MassRow, MomentumRow, NO_LIMIT, Params, PassRow, PointRow, Softness, Substep, TorqueRow,
     TurningRow,
 };
 pub use summary::ContactSummary;

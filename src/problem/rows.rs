@@ -244,14 +244,14 @@ pub struct JointRow {
     pub is_loose: f32,
     /// Index of its first axis in `axes`.
     pub first_axis: u32,
-    /// Number of its axes, up to [`MOST_AXES`].
+    /// Number of its axes, up to [`MAX_AXES`].
     pub axis_count: u32,
     #[doc(hidden)]
     pub pad: [u32; 2],
 }
 
 /// Most rows of axes of one joint: six axes, each with bounds and a drive.
-pub const MOST_AXES: usize = 12;
+pub const MAX_AXES: usize = 12;
 
 /// [`AxisRow::left`] of rows that are no limits. Limits this far away, and infinite limits, are never reached (m, rad).
 pub const NO_LIMIT: f32 = -1e18;

@@ -3,7 +3,7 @@
 use glam::{Vec3, Vec4};
 use parry3d::math::Pose;
 
-use crate::world::{MOST_LENGTH, Shape};
+use crate::world::{MAX_LENGTH, Shape};
 
 /// A ray against boxes that are enlarged by `grow` on every side.
 pub(super) struct BoxRay {
@@ -20,7 +20,7 @@ const LEAST: f32 = 1e-18;
 impl BoxRay {
     /// Returns `None` for a zero direction or numbers out of range.
     pub fn new(origin: Vec3, direction: Vec3, grow: Vec3) -> Option<Self> {
-        let is_place = origin.abs().cmple(Vec3::splat(MOST_LENGTH)).all();
+        let is_place = origin.abs().cmple(Vec3::splat(MAX_LENGTH)).all();
         // Scale first: the square of a direction can overflow even if the direction does not.
         let direction = (direction / direction.abs().max_element()).try_normalize().filter(|_| is_place)?;
         let component = |x: f32| 1.0 / if x.abs() < LEAST { LEAST.copysign(x) } else { x };

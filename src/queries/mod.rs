@@ -9,7 +9,7 @@ use parry3d::math::Pose;
 
 use crate::collide::{Clearance, Detector, Place, Places, clearances};
 use crate::math::rotation::squared_length;
-use crate::world::{BodyHandle, Collider, MOST_LENGTH, Shape, World, pose};
+use crate::world::{BodyHandle, Collider, MAX_LENGTH, Shape, World, pose};
 use boxes::BoxRay;
 pub use filter::{Filter, Predicate};
 
@@ -46,7 +46,7 @@ pub type Found = (BodyHandle, usize);
 ///
 /// For 20,000 boxes, building takes 1.4 ms on two threads, and a ray takes 1 µs: build it once for all queries of one
 /// state. All lengths are in meters. A query meets nothing if its direction is zero, if it has a NaN, or if a
-/// coordinate exceeds [`MOST_LENGTH`]. A query never meets bodies beyond that distance. Of two colliders at equal
+/// coordinate exceeds [`MAX_LENGTH`]. A query never meets bodies beyond that distance. Of two colliders at equal
 /// distance, the one with the smaller body index counts as nearer, then the one with the smaller index on its body.
 /// Meshes and height fields are surfaces: they contain no points, and queries meet them from both sides.
 ///
@@ -148,7 +148,7 @@ impl<'a> Queries<'a> {
             });
             found.map_or(f32::INFINITY, |hit| keep_nearest(&mut nearest, hit))
         };
-        let mut limit = most.min(MOST_LENGTH * 8.0);
+        let mut limit = most.min(MAX_LENGTH * 8.0);
         for &plane in &part.planes {
             limit = limit.min(visit(plane));
         }
@@ -265,7 +265,7 @@ impl<'a> Queries<'a> {
         meets: impl Fn(&Collider, &Pose, [f32; 2]) -> Option<(f32, Vec3, Vec3)>,
     ) {
         let Some(part) = self.part(filter).filter(|_| most >= 0.0) else { return };
-        let most = most.min(MOST_LENGTH * 8.0);
+        let most = most.min(MAX_LENGTH * 8.0);
         let mut visit = |place: Place, enters: f32| {
             let hit = self.accepted(place, filter).and_then(|(body, collider, pose)| {
                 let (distance, point, normal) = meets(collider, &pose, [enters, most])?;
@@ -313,7 +313,7 @@ impl<'a> Queries<'a> {
         mut visit: impl FnMut(BodyHandle, usize, &Collider, Pose),
     ) {
         let Some(part) = self.part(filter) else { return };
-        let (lower, upper) = (lower.max(Vec3::splat(-8.0 * MOST_LENGTH)), upper.min(Vec3::splat(8.0 * MOST_LENGTH)));
+        let (lower, upper) = (lower.max(Vec3::splat(-8.0 * MAX_LENGTH)), upper.min(Vec3::splat(8.0 * MAX_LENGTH)));
         let mut tell = |place: Place| {
             if let Some((body, collider, pose)) = self.accepted(place, filter) {
                 visit(body, place.collider as usize, collider, pose);
@@ -364,7 +364,7 @@ fn order(hit: &Hit) -> (f32, usize, usize) {
 }
 
 fn is_place(point: Vec3) -> bool {
-    point.abs().cmple(Vec3::splat(MOST_LENGTH)).all()
+    point.abs().cmple(Vec3::splat(MAX_LENGTH)).all()
 }
 
 /// The pose of the query's shape, and its box. Returns `None` if the pose is invalid.
@@ -373,7 +373,7 @@ fn placed(shape: &Shape, position: Vec3, rotation: Quat) -> Option<(Pose, (Vec3,
     is_pose.then(|| {
         let own = pose(position, rotation);
         let aabb = shape.0.compute_aabb(&own);
-        let most = Vec3::splat(8.0 * MOST_LENGTH);
+        let most = Vec3::splat(8.0 * MAX_LENGTH);
         (own, (aabb.mins.max(-most), aabb.maxs.min(most)))
     })
 }

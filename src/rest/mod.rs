@@ -22,7 +22,7 @@ use crate::world::{Body, World};
 use bearing::{Balance, Point, Wrench};
 
 /// Smallest rise of the normal of a supporting contact, as the sine of its angle from the horizontal.
-const LEAST_RISE: f64 = 0.01;
+const MIN_RISE: f64 = 0.01;
 /// Most rounds in which bodies that rest on falling bodies are let go.
 const ROUNDS: usize = 16;
 
@@ -269,7 +269,7 @@ fn bearing(row: u32, gravity: DVec3, slow: f64, problem: &StepProblem) -> Option
         f64::from(velocity.length()) <= most
     };
     let point = &problem.points[contact.first_point as usize];
-    let bears = rise.abs() >= LEAST_RISE && problem.masses[upper as usize].inv_mass > 0.0;
+    let bears = rise.abs() >= MIN_RISE && problem.masses[upper as usize].inv_mass > 0.0;
     (bears && is_slow(a, point.r_a) && is_slow(b, point.r_b)).then_some(Bearing { row, upper, lower, sign })
 }
 

@@ -1,6 +1,6 @@
 //! An entropy code for numbers.
 //!
-//! A number is a symbol for its size, and the lower bits. Symbols have Huffman codes of at most [`MOST_BITS`] bits:
+//! A number is a symbol for its size, and the lower bits. Symbols have Huffman codes of at most [`MAX_BITS`] bits:
 //! frequent symbols are shorter. Each symbol takes at least one bit, so no count can announce more numbers than there
 //! are bits.
 
@@ -14,7 +14,7 @@ const FLOATS: u32 = 2 * SIZES;
 const BYTES: u32 = FLOATS + 512;
 const SYMBOLS: usize = (BYTES + 256) as usize;
 /// Largest number of bits of a symbol.
-const MOST_BITS: u32 = 10;
+const MAX_BITS: u32 = 10;
 
 /// A symbol and its lower bits.
 #[derive(Clone, Copy, Default)]
@@ -112,17 +112,17 @@ pub(super) fn decode(bytes: &mut &[u8]) -> Result<Vec<Coded>> {
     for _ in 0..used {
         let own = get(bytes)?;
         let (symbol, length) = (next.saturating_add(own >> 4), own & 15);
-        ensure((symbol as usize) < SYMBOLS && (1..=MOST_BITS).contains(&length), || {
+        ensure((symbol as usize) < SYMBOLS && (1..=MAX_BITS).contains(&length), || {
             format!("symbol {symbol} of {length} bits")
         })?;
         all.push((symbol, length));
         next = symbol + 1;
     }
-    let room: u32 = all.iter().map(|&(_, length)| 1 << (MOST_BITS - length)).sum();
-    ensure(room <= 1 << MOST_BITS, || "more symbols than codes".to_owned())?;
+    let room: u32 = all.iter().map(|&(_, length)| 1 << (MAX_BITS - length)).sum();
+    ensure(room <= 1 << MAX_BITS, || "more symbols than codes".to_owned())?;
     // For each bit pattern: the symbol that it starts with, its length and its number of lower bits; 0 if there is
     // none.
-    let mut table = [(0_u16, 0_u8, 0_u8); 1 << MOST_BITS];
+    let mut table = [(0_u16, 0_u8, 0_u8); 1 << MAX_BITS];
     for (code, length, symbol) in codes_of(all.into_iter()) {
         for entry in table.iter_mut().skip(code as usize).step_by(1 << length) {
             *entry = (symbol as u16, length as u8, bits_below(symbol) as u8);
@@ -132,7 +132,7 @@ pub(super) fn decode(bytes: &mut &[u8]) -> Result<Vec<Coded>> {
     let (mut numbers, mut at) = (Vec::with_capacity(count), 0_usize);
     for _ in 0..count {
         let waiting = window(bytes, at);
-        let (symbol, length, below) = table[waiting as usize & ((1 << MOST_BITS) - 1)];
+        let (symbol, length, below) = table[waiting as usize & ((1 << MAX_BITS) - 1)];
         if length == 0 {
             return Err(input!("bits without a symbol"));
         }
@@ -164,7 +164,7 @@ fn lengths(used: &[(u32, u32)]) -> Vec<u32> {
     by_count.sort_unstable();
     loop {
         let lengths = lengths_of_sorted(&by_count);
-        if lengths.iter().all(|&length| length <= MOST_BITS) {
+        if lengths.iter().all(|&length| length <= MAX_BITS) {
             return lengths;
         }
         // The order does not change.
@@ -209,8 +209,8 @@ fn codes_of(symbols: impl Iterator<Item = (u32, u32)>) -> impl Iterator<Item = (
     sorted.sort_unstable();
     let mut next = 0_u32;
     sorted.into_iter().map(move |(length, symbol)| {
-        let code = next >> (MOST_BITS - length);
-        next += 1 << (MOST_BITS - length);
+        let code = next >> (MAX_BITS - length);
+        next += 1 << (MAX_BITS - length);
         (code.reverse_bits() >> (u32::BITS - length), length, symbol)
     })
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Mat3, Quat, Vec3};
 
 use super::groups::Groups;
-use super::limits::{MOST_DAMPING, MOST_GRAVITY, MOST_SPEED, check_place, check_rotation, is_within};
+use super::limits::{MAX_DAMPING, MAX_GRAVITY, MAX_SPEED, check_place, check_rotation, is_within};
 use super::mass::MassProperties;
 use super::shape::Shape;
 use crate::error::{Result, ensure, input};
@@ -262,7 +262,7 @@ pub struct Body {
     pub can_sleep: bool,
     /// Mass, center of mass and inertia; zero unless the body is dynamic. A later change of [`Self::colliders`] or
     /// [`Self::kind`] does not change them: call [`Self::update_mass`]. A simulation raises a moment of inertia that is
-    /// less than 1/32 of the mass times the squared lever of the shapes ([`MassProperties::MOST_LEVERAGE`]).
+    /// less than 1/32 of the mass times the squared lever of the shapes ([`MassProperties::MAX_LEVERAGE`]).
     pub mass: MassProperties,
     /// Friction and restitution of the shapes that have no own [`Collider::material`].
     pub material: Material,
@@ -1024,8 +1024,8 @@ impl Body {
         check_place("position", self.position)?;
         check_rotation("rotation", self.rotation)?;
         for (name, v) in [("linear", self.linear_velocity), ("angular", self.angular_velocity)] {
-            let message = || format!("{name} velocity = {v}: must be at most {MOST_SPEED:e} in size");
-            ensure(is_within(v, MOST_SPEED), message)?;
+            let message = || format!("{name} velocity = {v}: must be at most {MAX_SPEED:e} in size");
+            ensure(is_within(v, MAX_SPEED), message)?;
         }
         let loads = [self.whole_force(), self.whole_torque()];
         let accelerations = if loads != [Vec3::ZERO; 2] && self.kind == BodyKind::Dynamic && self.mass.mass > 0.0 {
@@ -1036,17 +1036,17 @@ impl Body {
         };
         for ((name, load), acceleration) in ["force", "torque"].into_iter().zip(loads).zip(accelerations) {
             let message =
-                || format!("{name} = {load}: must accelerate the body by at most {MOST_GRAVITY:e} along every axis");
-            ensure(is_within(acceleration, MOST_GRAVITY), message)?;
+                || format!("{name} = {load}: must accelerate the body by at most {MAX_GRAVITY:e} along every axis");
+            ensure(is_within(acceleration, MAX_GRAVITY), message)?;
         }
         for (name, rate) in [("linear_damping", self.linear_damping), ("angular_damping", self.angular_damping)] {
-            ensure((0.0..=MOST_DAMPING).contains(&rate), || {
-                format!("{name} = {rate}: must be 0 to {MOST_DAMPING:e} 1/s")
+            ensure((0.0..=MAX_DAMPING).contains(&rate), || {
+                format!("{name} = {rate}: must be 0 to {MAX_DAMPING:e} 1/s")
             })?;
         }
         let scale = self.gravity_scale;
-        ensure(scale.abs() <= MOST_GRAVITY, || {
-            format!("gravity_scale = {scale}: must be at most {MOST_GRAVITY:e} in size")
+        ensure(scale.abs() <= MAX_GRAVITY, || {
+            format!("gravity_scale = {scale}: must be at most {MAX_GRAVITY:e} in size")
         })
     }
 

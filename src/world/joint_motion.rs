@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use super::World;
 use super::joint::{Joint, Linear, NO_FRAME, NOWHERE};
 use super::joint_axis::{Axis, Bounds, Drive};
-use super::limits::{MOST_LENGTH, MOST_SPEED, check_rotation};
+use super::limits::{MAX_LENGTH, MAX_SPEED, check_rotation};
 use crate::error::{Result, ensure};
 use crate::math::rotation::{product, unit};
 
@@ -39,10 +39,10 @@ pub struct JointMotion {
 }
 
 /// The smallest value of angle cot(angle). Near pi the direction of the rotation is lost.
-const MOST_TURNED: f32 = -30.0;
+const MAX_TURNED: f32 = -30.0;
 
 /// A shorter distance than this has no direction (m).
-pub(crate) const LEAST_DISTANCE: f32 = 1e-6;
+pub(crate) const MIN_DISTANCE: f32 = 1e-6;
 
 impl World {
     /// Positions and speeds along the axes of a joint. All are NaN if a body of the joint is gone.
@@ -76,7 +76,7 @@ impl World {
         }
         if let Linear::Distance(_) = joint.linear {
             let distance = offset.length();
-            let along = if distance > LEAST_DISTANCE { offset / distance } else { axes_b[0] };
+            let along = if distance > MIN_DISTANCE { offset / distance } else { axes_b[0] };
             (direction[0], position[0]) = (along, distance);
             (direction[1], direction[2], position[1], position[2]) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
         }
@@ -93,7 +93,7 @@ impl World {
         if angle > 1e-3 {
             let n = turn / angle;
             let t = axes_b[0].cross(n);
-            let across = t * (angle / libm::tanf(angle)).max(MOST_TURNED) + axes_b[0] * angle;
+            let across = t * (angle / libm::tanf(angle)).max(MAX_TURNED) + axes_b[0] * angle;
             for direction in &mut direction[4..] {
                 *direction = n * n.dot(*direction) + across * t.dot(*direction);
             }
@@ -157,11 +157,11 @@ impl Joint {
         };
         ensure(self.angular[0].bounds != NOWHERE, message)?;
         match &self.linear {
-            Linear::Axes(axes) => axes.iter().try_for_each(|axis| axis.check("linear", -MOST_LENGTH, MOST_LENGTH))?,
+            Linear::Axes(axes) => axes.iter().try_for_each(|axis| axis.check("linear", -MAX_LENGTH, MAX_LENGTH))?,
             Linear::Distance(distance) => {
                 let message = || "distance: locked at zero: use a ball joint".into();
                 ensure(distance.bounds != Bounds::Locked, message)?;
-                distance.check("distance", 0.0, MOST_LENGTH)?;
+                distance.check("distance", 0.0, MAX_LENGTH)?;
             }
         }
         self.angular.iter().try_for_each(|axis| axis.check("angular", -PI, PI))
@@ -192,8 +192,8 @@ impl Axis {
         let max_load = match self.drive {
             Drive::None => return Ok(()),
             Drive::Motor { speed, max_load } => {
-                let message = || format!("{name}: speed = {speed}: must be at most {MOST_SPEED:e} in size");
-                ensure(speed.abs() <= MOST_SPEED, message)?;
+                let message = || format!("{name}: speed = {speed}: must be at most {MAX_SPEED:e} in size");
+                ensure(speed.abs() <= MAX_SPEED, message)?;
                 max_load
             }
             Drive::Spring { target, frequency, damping_ratio, max_load } => {

@@ -6,10 +6,10 @@ use super::body::{Body, BodyKind, Collider};
 use super::mass::MassProperties;
 use super::shape::{placed, pose};
 
-/// Raises the moments of inertia of a body to the limit that [`MassProperties::MOST_LEVERAGE`] sets.
+/// Raises the moments of inertia of a body to the limit that [`MassProperties::MAX_LEVERAGE`] sets.
 pub(super) fn raise_inertia(body: &mut Body) {
     if body.kind == BodyKind::Dynamic {
-        let least = squared_levers(&body.mass, &body.colliders) * (body.mass.mass / MassProperties::MOST_LEVERAGE);
+        let least = squared_levers(&body.mass, &body.colliders) * (body.mass.mass / MassProperties::MAX_LEVERAGE);
         body.mass.principal_inertia = body.mass.principal_inertia.max(least);
     }
 }

@@ -54,12 +54,12 @@ impl MassProperties {
     /// Range of moments of inertia that can be simulated (kg m²).
     pub const MOMENTS: RangeInclusive<f32> = 1e-30..=1e30;
     /// Largest ratio of two moments of a body. For a rod the ratio is (length / radius)² / 6.
-    pub const MOST_RATIO: f32 = 1e12;
+    pub const MAX_RATIO: f32 = 1e12;
 
     /// Largest ratio of m r² to a moment of inertia that a simulation accepts, where r is the lever of the shapes about
     /// that axis. The ratio is 3 for boxes, 2.5 for balls and at most 15 for cones. From about 100 on, sweeps that
     /// solve one point at a time never bring a body to rest (docs/derivation.md, section 3).
-    pub const MOST_LEVERAGE: f32 = 32.0;
+    pub const MAX_LEVERAGE: f32 = 32.0;
 
     /// A mass (kg) at a point of the body's frame (m): without inertia of its own.
     pub const fn point(mass: f32, center: Vec3) -> Self {
@@ -112,7 +112,7 @@ impl MassProperties {
         let moments = principal_inertia.to_array();
         let fits = Self::MASSES.contains(&mass)
             && moments.iter().all(|i| Self::MOMENTS.contains(i))
-            && principal_inertia.max_element() <= Self::MOST_RATIO * principal_inertia.min_element();
+            && principal_inertia.max_element() <= Self::MAX_RATIO * principal_inertia.min_element();
         ensure(fits, || {
             format!(
                 "mass = {mass:e} kg, inertia = {moments:?} kg m²: must be 1e-15 to 1e15 kg, 1e-30 to 1e30 kg m² and moments within \

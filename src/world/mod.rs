@@ -24,9 +24,9 @@ pub use groups::Groups;
 pub use joint::{Joint, Linear};
 pub use joint_axis::{Axis, Bounds, Drive};
 pub use joint_motion::JointMotion;
-pub(crate) use joint_motion::LEAST_DISTANCE;
+pub(crate) use joint_motion::MIN_DISTANCE;
 pub use joints::{JointHandle, Joints};
-pub use limits::{MOST_GRAVITY, MOST_LENGTH, MOST_SPEED};
+pub use limits::{MAX_GRAVITY, MAX_LENGTH, MAX_SPEED};
 pub use mass::MassProperties;
 pub use shape::Shape;
 pub(crate) use shape::{placed, pose, seen_from};
@@ -291,16 +291,16 @@ impl World {
         })
     }
 
-    /// Raises moments of inertia that are too small for the sweeps: see [`MassProperties::MOST_LEVERAGE`].
+    /// Raises moments of inertia that are too small for the sweeps: see [`MassProperties::MAX_LEVERAGE`].
     pub(crate) fn raise_inertias(&mut self) {
         self.bodies.iter_mut().for_each(lever::raise_inertia);
     }
 
-    /// Refuses a gravity above [`MOST_GRAVITY`], or NaN.
+    /// Refuses a gravity above [`MAX_GRAVITY`], or NaN.
     pub(crate) fn check_gravity(&self) -> Result<()> {
         std::iter::once(self.gravity).chain(self.own_gravity.iter().flatten().copied()).try_for_each(|gravity| {
-            let message = || format!("gravity = {gravity}: must be at most {MOST_GRAVITY:e} m/s² along every axis");
-            ensure(is_within(gravity, MOST_GRAVITY), message)
+            let message = || format!("gravity = {gravity}: must be at most {MAX_GRAVITY:e} m/s² along every axis");
+            ensure(is_within(gravity, MAX_GRAVITY), message)
         })
     }
 
@@ -345,7 +345,7 @@ impl World {
             let breaks = joint.break_force;
             ensure(breaks > 0.0, || format!("joint {i}: break_force = {breaks}: must be above 0 N"))?;
             let are_places = is_place(joint.anchor_a) && is_place(joint.anchor_b);
-            ensure(are_places, || format!("joint {i}: its anchors must be at most {MOST_LENGTH:e} m in size"))?;
+            ensure(are_places, || format!("joint {i}: its anchors must be at most {MAX_LENGTH:e} m in size"))?;
             joint.check_axes().map_err(|e| e.within(format_args!("joint {i}")))?;
         }
         Ok(())

@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use parry3d::math::Pose;
 use parry3d::shape::{Cylinder, HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
 
-use super::limits::{MOST_LENGTH, is_place};
+use super::limits::{MAX_LENGTH, is_place};
 use crate::error::{Error, Result, ensure, input};
 use crate::math::rotation;
 
@@ -100,7 +100,7 @@ impl Shape {
             return Err(input!("mesh triangle {t:?} names a vertex beyond the last of {count}"));
         }
         if let Some((k, v)) = vertices.iter().enumerate().find(|(_, v)| !is_place(**v)) {
-            return Err(input!("mesh vertex {k}, {v}: must be at most {MOST_LENGTH:e} m in size"));
+            return Err(input!("mesh vertex {k}, {v}: must be at most {MAX_LENGTH:e} m in size"));
         }
         let mesh = SharedShape::trimesh_with_flags(vertices, triangles, TriMeshFlags::FIX_INTERNAL_EDGES);
         mesh.map(|mesh| Self(mesh, None)).map_err(|e| input!("mesh: {e}"))
@@ -119,10 +119,10 @@ impl Shape {
         if rows < 2 || columns < 2 || heights.iter().any(|r| r.len() != columns) {
             return Err(Error::input("a height field needs at least 2 rows of equal length with at least 2 heights"));
         }
-        let is_height = |h: &f32| (h * scale.y).abs() <= MOST_LENGTH;
+        let is_height = |h: &f32| (h * scale.y).abs() <= MAX_LENGTH;
         let fits = is_place(scale) && scale.min_element() > 0.0 && heights.iter().flatten().all(is_height);
         ensure(fits, || {
-            format!("a height field, scaled by {scale}: must be more than 0 and at most {MOST_LENGTH:e} m in size")
+            format!("a height field, scaled by {scale}: must be more than 0 and at most {MAX_LENGTH:e} m in size")
         })?;
         // parry stores columns one after another.
         let data = (0..columns).flat_map(|c| heights.iter().map(move |row| row[c])).collect();
@@ -130,7 +130,7 @@ impl Shape {
         Ok(Self(SharedShape::heightfield_with_flags(data, scale, HeightFieldFlags::FIX_INTERNAL_EDGES), None))
     }
 
-    /// Refuses a shape without extent, or with a number that is not finite or larger than [`MOST_LENGTH`].
+    /// Refuses a shape without extent, or with a number that is not finite or larger than [`MAX_LENGTH`].
     ///
     /// ```
     /// use drystone::Shape;
@@ -143,8 +143,8 @@ impl Shape {
     pub fn check(&self) -> Result<()> {
         let sizes = |kind: &str, sizes: &[(&str, f32)]| {
             sizes.iter().try_for_each(|(name, size)| {
-                let message = || format!("{kind} of {name} {size}: must be more than 0 and at most {MOST_LENGTH:e} m");
-                ensure(*size > 0.0 && *size <= MOST_LENGTH, message)
+                let message = || format!("{kind} of {name} {size}: must be more than 0 and at most {MAX_LENGTH:e} m");
+                ensure(*size > 0.0 && *size <= MAX_LENGTH, message)
             })
         };
         match self.0.as_typed_shape() {
@@ -163,7 +163,7 @@ impl Shape {
             }
             _ => {
                 let extents = self.0.compute_local_aabb();
-                let message = || format!("{self:?}: its points must be at most {MOST_LENGTH:e} m in size");
+                let message = || format!("{self:?}: its points must be at most {MAX_LENGTH:e} m in size");
                 ensure(is_place(extents.mins) && is_place(extents.maxs), message)
             }
         }

@@ -3,7 +3,7 @@
 use crate::common::random::Random;
 use drystone::glam::{Quat, Vec3};
 use drystone::queries::{Filter, Found, Hit, Queries};
-use drystone::world::MOST_LENGTH;
+use drystone::world::MAX_LENGTH;
 use drystone::{Body, BodyKind, Groups, Shape, Simulation, World};
 use parry3d::math::Pose;
 use parry3d::query::{self, Ray, ShapeCastOptions};
@@ -568,7 +568,7 @@ fn shapes_of_all_sizes_give_numbers() {
         ];
         for shape in &shapes {
             for _ in 0..3 {
-                let place = random.vector((3.0 * size).min(MOST_LENGTH));
+                let place = random.vector((3.0 * size).min(MAX_LENGTH));
                 world.add(
                     Body::fixed().shape(shape.clone()).position(place.x, place.y, place.z).rotation(random.rotation()),
                 );
@@ -577,8 +577,8 @@ fn shapes_of_all_sizes_give_numbers() {
         let (queries, filter) = (Queries::of(&world), Filter::default());
         let mut met = 0;
         for k in 0..400 {
-            let reach = [size, MOST_LENGTH, 1.0, 0.0][k % 4];
-            let (from, along) = (random.vector((2.0 * reach).min(MOST_LENGTH)), random.vector(1.0));
+            let reach = [size, MAX_LENGTH, 1.0, 0.0][k % 4];
+            let (from, along) = (random.vector((2.0 * reach).min(MAX_LENGTH)), random.vector(1.0));
             let mut hits = queries.ray_all(from, along, f32::INFINITY, &filter);
             hits.extend(queries.closest(from, f32::INFINITY, &filter));
             for shape in &shapes {

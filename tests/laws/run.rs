@@ -15,16 +15,16 @@ pub const SHARE: f64 = 1e-3;
 pub const SHARE_OF_WEIGHT: f64 = 1e-6;
 /// The most that a world may gain above what it began with, over that. The energy of a motion that springs of joints hold for a while comes back, and
 /// velocities are half a substep off places: law 1, in a form that holds today.
-pub const MOST_LASTING: f64 = 0.01;
+pub const MAX_LASTING: f64 = 0.01;
 /// The largest gap of a joint, over its lever, or angle (rad).
-pub const MOST_GAP: f64 = 0.01;
+pub const MAX_GAP: f64 = 0.01;
 /// The largest change of momentum of what nothing outside touches, over the sum of the sizes of the momenta of the bodies, beyond what the
 /// rounding of places and of a fall explains ([`Rounding`]).
 ///
 /// A velocity of f32 rounds by 2^-24 of itself. A step of 8 substeps changes it some 50 times in each of its joints and contacts, so that 10 s of
 /// 60 steps round it some 10^5 times. Signs of these errors are not those of each other: their sum is 2^-24 times the root of 10^5, 2e-5; five
 /// times that.
-pub const MOST_DRIFT: f64 = 1e-4;
+pub const MAX_DRIFT: f64 = 1e-4;
 
 /// A world, and how it runs.
 #[derive(Clone, Debug)]
@@ -97,10 +97,10 @@ impl Verdict {
         let laws = [
             (self.lost.is_some(), "finite"),
             (self.excess > 0.0, "energy"),
-            (self.lasting_gain() > MOST_LASTING, "lasting"),
-            (self.gap.worst() > MOST_GAP, "gap"),
-            (momentum > MOST_DRIFT, "momentum"),
-            (spin > MOST_DRIFT, "spin"),
+            (self.lasting_gain() > MAX_LASTING, "lasting"),
+            (self.gap.worst() > MAX_GAP, "gap"),
+            (momentum > MAX_DRIFT, "momentum"),
+            (spin > MAX_DRIFT, "spin"),
         ];
         laws.into_iter().filter(|(is_broken, _)| *is_broken).map(|(_, law)| law).collect()
     }

@@ -47,7 +47,7 @@ impl Cause {
 }
 
 /// Most runs of a shrinking.
-const MOST_RUNS: usize = 500;
+const MAX_RUNS: usize = 500;
 
 /// The smallest case found that still shows the cause.
 pub fn shrunk(case: &Case, cause: Cause) -> Case {
@@ -56,7 +56,7 @@ pub fn shrunk(case: &Case, cause: Cause) -> Case {
     let mut runs = 0;
     let mut shows = |next: &Case| {
         runs += 1;
-        (runs <= MOST_RUNS).then(|| cause.is_in(&run(next)))
+        (runs <= MAX_RUNS).then(|| cause.is_in(&run(next)))
     };
     // A run of some times what it takes to break the law costs less, and leaves room for worlds that take longer.
     let steps = run(&best).broken_at.map_or(u32::MAX, |step| 4 * step + 60);

@@ -1,7 +1,7 @@
 //! What many runs came to: a table with a row for each family and kind, and a file with a line for each world.
 
 use crate::laws::draw::Drawn;
-use crate::laws::run::{MOST_DRIFT, MOST_GAP, Verdict};
+use crate::laws::run::{MAX_DRIFT, MAX_GAP, Verdict};
 
 /// A world, its run, and the time that it took (s).
 pub type Row = (Drawn, (Verdict, f64));
@@ -47,11 +47,11 @@ fn line(name: &str, rows: &[Row], most_seeds: usize) -> String {
         count(&gained(1e6)),
         count(&|v| v.lost.is_some()),
         most(&finite_gain),
-        share(&|v| v.gap.worst() > MOST_GAP),
+        share(&|v| v.gap.worst() > MAX_GAP),
         most(&|v| v.gap.worst()),
-        share(&|v| drift(0)(v) > MOST_DRIFT),
+        share(&|v| drift(0)(v) > MAX_DRIFT),
         most(&drift(0)),
-        share(&|v| drift(1)(v) > MOST_DRIFT),
+        share(&|v| drift(1)(v) > MAX_DRIFT),
         most(&drift(1)),
         seconds / rows.len() as f64,
         seeds.join(" "),

@@ -85,7 +85,7 @@ const SCALE: [[f32; 3]; 5] =
     [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
 
 /// The number of doublings of substeps with the lightest shade.
-const MOST_DOUBLED: f32 = 6.0;
+const MAX_DOUBLED: f32 = 6.0;
 
 impl ColorBy {
     /// A value for each body: number of the material, number of the batch, speed (m/s), impulse (N s), 1 for sleep, or
@@ -146,7 +146,7 @@ impl ColorBy {
             (_, Self::Material) => shaded(MATERIALS[value as usize % MATERIALS.len()], i),
             (_, Self::Batch) => batch_color(value as u32),
             (_, Self::Sleeping) => shaded(if value > 0.0 { ASLEEP } else { AWAKE }, i),
-            (_, Self::Effort) => on_scale((value / MOST_DOUBLED).min(1.0).powi(2)),
+            (_, Self::Effort) => on_scale((value / MAX_DOUBLED).min(1.0).powi(2)),
             (_, Self::Speed | Self::Impulse) => on_scale(value / scale.max(f32::MIN_POSITIVE)),
         };
         world.bodies.iter().zip(values).enumerate().map(color).collect()

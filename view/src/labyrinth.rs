@@ -15,7 +15,7 @@ const GOAL_COLOR: Rgba = [92, 170, 96, 255];
 const WALL_COLOR: Rgba = [150, 98, 58, 255];
 const BALL_COLOR: Rgba = [206, 210, 218, 255];
 /// Largest number of steps before a picture: a tenth of a second.
-const MOST_STEPS: f32 = 12.0;
+const MAX_STEPS: f32 = 12.0;
 
 pub(crate) fn colors(world: &World) -> Vec<Rgba> {
     let mut colors = vec![WALL_COLOR; world.bodies.len()];
@@ -82,7 +82,7 @@ impl Labyrinth {
         let wanted = self.wanted();
         self.begun |= wanted != [0.0; 2];
         let dt = self.game.dt();
-        self.owed = (self.owed + seconds).min(MOST_STEPS * dt);
+        self.owed = (self.owed + seconds).min(MAX_STEPS * dt);
         while self.begun && self.owed >= dt {
             self.game.step(wanted)?;
             self.owed -= dt;

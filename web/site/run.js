@@ -6,7 +6,7 @@ import * as numbers from "./numbers.js";
 
 const element = (id) => document.getElementById(id);
 /// Largest number of steps between two pictures, and the time after which no further step begins (ms).
-const [MOST_STEPS, PATIENCE] = [4, 25];
+const [MAX_STEPS, PATIENCE] = [4, 25];
 
 /// Events: `replaced` when something else runs, `differs` at the first number that differs, and `canvases` when
 /// canvases were replaced.
@@ -134,7 +134,7 @@ export const setPace = (times) => (pace = times);
 
 export const canvases = ["picture", "picture-beside"];
 /// Number of lost devices after which WebGL draws instead of WebGPU.
-const MOST_LOSSES = 3;
+const MAX_LOSSES = 3;
 let losses = 0;
 let drawsByWebGPU = true;
 
@@ -176,7 +176,7 @@ async function besides() {
   const lost = pictures.map((picture) => picture.is_lost());
   if (!lost.includes(true)) return;
   losses += 1;
-  if (losses <= MOST_LOSSES) {
+  if (losses <= MAX_LOSSES) {
     for (const k of pictures.keys()) if (lost[k]) await renew(k);
   } else if (drawsByWebGPU) {
     await leaveWebGPU(pictures.length);
@@ -226,7 +226,7 @@ async function advance(seconds) {
 
 async function steps(seconds) {
   const dt = shows[0].dt();
-  owed = Math.min(owed + seconds * pace, MOST_STEPS * dt);
+  owed = Math.min(owed + seconds * pace, MAX_STEPS * dt);
   const began = performance.now();
   let made = 0;
   while (owed >= dt && performance.now() - began < PATIENCE) {

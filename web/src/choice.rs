@@ -8,7 +8,7 @@ use drystone_scenes::{CATALOGUE, Scene};
 use serde_json::{Map, Value};
 
 /// Largest number of bodies of a scene in the page: about 4 kB each, and WebAssembly has at most 4 GiB.
-pub const MOST_BODIES: u64 = 200_000;
+pub const MAX_BODIES: u64 = 200_000;
 
 /// A scene of the catalogue. `parameters` are `name=value`.
 pub fn scene(name: &str, parameters: &[String]) -> Result<Scene> {
@@ -22,10 +22,10 @@ pub fn scene(name: &str, parameters: &[String]) -> Result<Scene> {
 
 /// Refuses a number of bodies that exceeds the memory of a page.
 pub fn check_size(name: &str, bodies: u64) -> Result<()> {
-    if bodies <= MOST_BODIES {
+    if bodies <= MAX_BODIES {
         return Ok(());
     }
-    Err(Error::TooLarge(format!("{name}: {bodies} bodies: must be at most {MOST_BODIES} in a browser")))
+    Err(Error::TooLarge(format!("{name}: {bodies} bodies: must be at most {MAX_BODIES} in a browser")))
 }
 
 /// Opens a backend for the sweeps: `cpu`, `webgpu`, or `webgpu-exact`, which has the bits of the CPU.

@@ -21,7 +21,7 @@ use crate::round::{cone, cylinder};
 const VELOCITY_ITERATIONS: u32 = 1;
 
 /// Most position iterations that the library takes.
-const MOST_ITERATIONS: u32 = 255;
+const MAX_ITERATIONS: u32 = 255;
 
 /// The library's only instance in this process, which makes all objects.
 struct Sdk(*mut PxPhysics);
@@ -55,8 +55,8 @@ impl Physx {
     /// A scene with everything at the library's defaults, except that TGS solves it, gyroscopic forces act, and nothing sleeps or is
     /// damped.
     pub(crate) fn new(scene: &Scene, iterations: u32, threads: usize) -> Result<Self> {
-        if iterations > MOST_ITERATIONS {
-            return Err(Error::input(format!("{iterations} substeps: PhysX takes at most {MOST_ITERATIONS}")));
+        if iterations > MAX_ITERATIONS {
+            return Err(Error::input(format!("{iterations} substeps: PhysX takes at most {MAX_ITERATIONS}")));
         }
         let world = scene.world.clone();
         let sdk = sdk();

@@ -15,7 +15,7 @@ use drystone_problems::solver::Order;
 use drystone_problems::solver::newton::{Ended, NewtonEnded};
 
 /// Largest number of sweeps with a tolerance.
-const MOST_SWEEPS: u32 = 40_000;
+const MAX_SWEEPS: u32 = 40_000;
 
 /// Default number of sweeps.
 const SWEEPS: u32 = 512;
@@ -97,7 +97,7 @@ impl SolveArgs {
             method,
             order,
             passes: self.passes.unwrap_or(order.passes()),
-            sweeps: if self.tolerance.is_some() { MOST_SWEEPS } else { self.sweeps.unwrap_or(SWEEPS) },
+            sweeps: if self.tolerance.is_some() { MAX_SWEEPS } else { self.sweeps.unwrap_or(SWEEPS) },
             tolerance: self.tolerance.unwrap_or(0.0),
         }
     }
@@ -115,7 +115,7 @@ impl SolveArgs {
         if self.backend != BackendKind::F64 {
             return Err(Error::input(format!("--backend {}: --method newton runs in f64", self.backend)));
         }
-        let r = NewtonReport::new(problem, self.tolerance.unwrap_or(TOLERANCE), MOST_SWEEPS);
+        let r = NewtonReport::new(problem, self.tolerance.unwrap_or(TOLERANCE), MAX_SWEEPS);
         if r.residuals.e_vel.is_nan() {
             return Err(Error::input(format!("{}: impulses left the finite range", self.file.display())));
         }

@@ -162,11 +162,11 @@ impl<'a> Reader<'a> {
 }
 
 /// Largest number of characters of a file that a message quotes.
-const MOST_QUOTED: usize = 80;
+const MAX_QUOTED: usize = 80;
 
 /// The text in quotes, or only its beginning: a file can have any content.
 fn quoted(text: &str) -> String {
-    match text.char_indices().nth(MOST_QUOTED) {
+    match text.char_indices().nth(MAX_QUOTED) {
         Some((end, _)) => format!("{:?}...", &text[..end]),
         None => format!("{text:?}"),
     }

@@ -7,7 +7,7 @@ use drystone::stages::memory;
 use drystone::stages::suggest::hint;
 
 /// Largest number of dynamic bodies in a scene of the catalogue.
-pub const MOST_BODIES: f64 = 4e6;
+pub const MAX_BODIES: f64 = 4e6;
 
 /// A number that shapes a scene of the catalogue.
 ///
@@ -245,7 +245,7 @@ mod tests {
             let most: Vec<f64> = entry.parameters.iter().map(most).collect();
             // A scene can start without moving bodies, and spawn them later.
             let least = if entry.name == "galton" { 0.0 } else { 1.0 };
-            assert!((least..=MOST_BODIES).contains(&(entry.bodies)(&most)), "{}", entry.name);
+            assert!((least..=MAX_BODIES).contains(&(entry.bodies)(&most)), "{}", entry.name);
         }
     }
 

@@ -16,14 +16,14 @@ mod masonry;
 mod stacks;
 mod vehicle;
 
-pub use entry::{Entry, MOST_BODIES, Parameter};
+pub use entry::{Entry, MAX_BODIES, Parameter};
 pub use families::{Family, Law, Member};
 
 use drystone::Result;
 use drystone::stages::error::ensure;
 
 const ANGLE: Parameter = Parameter::real("angle", 20.0, (0.0, 60.0), "angle of the slope [degrees]");
-const BOXES: Parameter = Parameter::whole("n", 1000, (1.0, MOST_BODIES), "number of boxes");
+const BOXES: Parameter = Parameter::whole("n", 1000, (1.0, MAX_BODIES), "number of boxes");
 const JITTER: Parameter =
     Parameter::real("jitter", 0.03, (0.0, 0.04), "largest shift off the grid along each axis [m]");
 const CUBES: Parameter = Parameter::whole("n", 10, (1.0, 10_000.0), "number of cubes");

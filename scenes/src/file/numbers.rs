@@ -5,7 +5,7 @@ use std::fmt::Display;
 use glam::Quat;
 
 use drystone::stages::error::input;
-use drystone::world::MOST_LENGTH;
+use drystone::world::MAX_LENGTH;
 use drystone::{Error, Result};
 
 /// Tolerance for the length of a quaternion or a normal. Within it, the value is normalized.
@@ -44,7 +44,7 @@ pub(super) fn positive<const N: usize>(name: impl Display, values: [f64; N]) -> 
 
 /// Coordinates (m).
 pub(super) fn lengths<const N: usize>(name: impl Display, values: [f64; N]) -> Result<[f32; N]> {
-    checked(name, values, "at most 1e9 m in size", |x| x.abs() <= MOST_LENGTH)
+    checked(name, values, "at most 1e9 m in size", |x| x.abs() <= MAX_LENGTH)
 }
 
 pub(super) fn rotation(name: &str, values: [f64; 4]) -> Result<Quat> {

@@ -9,10 +9,10 @@ use crate::kernels::joint_system::{measure_axis, measure_joint};
 use crate::kernels::{Axis, Contact, Joint, Pair, Rules, StepParams};
 use crate::math::{Lane, Vec3};
 use crate::plan::Kernel;
-use crate::problem::{Block, ContactRow, JointRow, MOST_AXES, StepProblem};
+use crate::problem::{Block, ContactRow, JointRow, MAX_AXES, StepProblem};
 
 /// Largest number of impulses of a constraint without the patch: a joint and its axes.
-pub(super) const MOST_IMPULSES: usize = 1 + MOST_AXES;
+pub(super) const MAX_IMPULSES: usize = 1 + MAX_AXES;
 
 /// A kind of constraint: contacts or joints.
 pub(super) trait Constraint: bytemuck::Pod + Sync {

@@ -19,7 +19,7 @@ use crate::problem::{AxisRow, JointRow, JointSystems, StepProblem};
 
 /// With fewer systems of equal structure, they are solved one after another: a column of one system fills a quarter of
 /// the lanes.
-const LEAST_SIDE_BY_SIDE: usize = 4;
+const MIN_SIDE_BY_SIDE: usize = 4;
 
 /// One system, or several of equal structure.
 #[derive(Clone, Copy)]
@@ -108,7 +108,7 @@ impl SystemLayout {
         }
         for i in first..self.groups.len() {
             let SystemGroup { systems, count, .. } = self.groups[i];
-            if count < LEAST_SIDE_BY_SIDE {
+            if count < MIN_SIDE_BY_SIDE {
                 self.groups[i] = SystemGroup::new(systems[0]);
                 self.groups.extend(systems[1..count].iter().map(|&system| SystemGroup::new(system)));
             }

@@ -5,7 +5,7 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-use super::constraint::{Constraint, MOST_IMPULSES};
+use super::constraint::{Constraint, MAX_IMPULSES};
 use super::lane_group::{LaneGroup, NO_ROW};
 use super::lane_rows::{LaneImpulses, LanePoints};
 use super::partition::{ColorRanges, Partition, PartitionedRows};
@@ -42,7 +42,7 @@ pub(super) struct LaneLayout<C> {
     pub ranges: ColorRanges,
     rows: PartitionedRows,
     /// For each color of each part: the number of constraints by number of points, and its first group and impulse.
-    counts: Vec<[usize; MOST_IMPULSES]>,
+    counts: Vec<[usize; MAX_IMPULSES]>,
     firsts: Vec<(usize, u32)>,
     /// State of accelerated sweeps.
     steps: Vec<ImpulseStep<Portable>>,
@@ -168,11 +168,11 @@ impl<C: Constraint> LaneLayout<C> {
         let patch = u32::from(C::HAS_POINTS && problem.has_patches());
         let kind_of = |row: u32| all[row as usize].points() as usize - 1;
         let (rows, cells) = (&self.rows, self.rows.ranges.len());
-        self.counts.resize(cells, [0; MOST_IMPULSES]);
+        self.counts.resize(cells, [0; MAX_IMPULSES]);
         let counts = Shared::new(&mut self.counts);
         threads.spread_each(0..cells, &|range| {
             for cell in range {
-                let mut count = [0; MOST_IMPULSES];
+                let mut count = [0; MAX_IMPULSES];
                 rows.at(cell).iter().for_each(|&row| count[kind_of(row)] += 1);
                 // SAFETY: tasks have different cells: `Threads::spread_each` cuts their range.
                 unsafe { counts.write(cell, count) };
@@ -195,7 +195,7 @@ impl<C: Constraint> LaneLayout<C> {
             for cell in range {
                 let (mut next, mut next_impulse) = firsts[cell];
                 // For each number of points: the group with free lanes, and the number of used lanes.
-                let (mut open, mut taken) = ([0; MOST_IMPULSES], [0; MOST_IMPULSES]);
+                let (mut open, mut taken) = ([0; MAX_IMPULSES], [0; MAX_IMPULSES]);
                 for &row in rows.at(cell) {
                     let kind = kind_of(row);
                     let lane = taken[kind] % WIDTH;

@@ -55,7 +55,7 @@ use timer::Timer;
 const SOFTWARE_ROWS_A_THREAD: u32 = 4;
 
 /// Largest number of devices in one run. After that many losses the processor continues.
-const MOST_DEVICES: usize = 3;
+const MAX_DEVICES: usize = 3;
 
 /// Runs plans on a device through wgpu.
 ///
@@ -394,7 +394,7 @@ impl Backend for Gpu {
             }
             let lost = self.lost + 1;
             let opened =
-                if lost < MOST_DEVICES { Self::open_after(lost, self.options.clone()).await.ok() } else { None };
+                if lost < MAX_DEVICES { Self::open_after(lost, self.options.clone()).await.ok() } else { None };
             Some(match opened {
                 Some(mut gpu) => {
                     gpu.rows_a_thread = self.rows_a_thread;

@@ -14,14 +14,14 @@ use crate::plan::{Kernel, Pass};
 use crate::problem::StepProblem;
 
 /// Largest number of rows of a pass: four for each thread.
-const MOST_ROWS: usize = 256;
+const MAX_ROWS: usize = 256;
 /// Largest number of passes. The first row of the uniform is their number.
-const MOST_PASSES: usize = PASS_ROWS - 1;
+const MAX_PASSES: usize = PASS_ROWS - 1;
 /// Largest number of loop iterations of one thread. Mesa's llvmpipe silently leaves a program after 65,535 iterations
 /// in total: a step of 770 passes lost its last ones.
-const MOST_ITERATIONS: usize = 60_000;
+const MAX_ITERATIONS: usize = 60_000;
 /// Smallest number of passes for a shader of their own.
-const FEWEST_PASSES: usize = 4;
+const MIN_PASSES: usize = 4;
 
 /// The program for all passes, and its uniform: the number of passes, then a row for each pass. Returns `None` if the
 /// world is too large for one workgroup, or if a kernel needs more than one.
@@ -32,9 +32,9 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
     };
     // All passes share the substep of one block.
     let fits = problem.blocks.len() == 1
-        && problem.points.len() <= 4 * MOST_ROWS
-        && (FEWEST_PASSES..=MOST_PASSES).contains(&passes.len())
-        && passes.iter().all(|pass| shares_only_rows(pass.kernel) && rows(pass) <= MOST_ROWS);
+        && problem.points.len() <= 4 * MAX_ROWS
+        && (MIN_PASSES..=MAX_PASSES).contains(&passes.len())
+        && passes.iter().all(|pass| shares_only_rows(pass.kernel) && rows(pass) <= MAX_ROWS);
     // Systems of joints need five more buffers.
     if !fits || problem.has_systems() || needs_many_buffers(problem, passes) {
         return None;
@@ -56,7 +56,7 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass]) -> Option<(Program, Vec
         let of_color = |color| 2 + problem.rows_of(&(color..color + 1)).len().div_ceil(threads) * of_row(pass.kernel);
         2 + pass.colors.clone().map(of_color).sum::<usize>()
     };
-    if passes.iter().map(iterations).sum::<usize>() > MOST_ITERATIONS {
+    if passes.iter().map(iterations).sum::<usize>() > MAX_ITERATIONS {
         return None;
     }
     Some((Program::OneDispatch(kernels.into(), threads as u32), table))

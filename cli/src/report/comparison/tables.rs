@@ -59,7 +59,7 @@ const LEAST: [(&str, &str); 5] = [
 ];
 
 /// Largest number of table rows for errors in which another engine is better.
-const MOST_LOST: usize = 6;
+const MAX_LOST: usize = 6;
 
 /// Rewrites the tables of the pages below `root` from the rows in `docs/report` and `docs/performance`, and returns the
 /// pages. With `check`, it writes nothing.
@@ -190,7 +190,7 @@ impl Rows {
             let _ = writeln!(text, "| **Where drystone loses** |{blank}");
         }
         let count = lost.len();
-        for (_, what, cells) in lost.into_iter().take(MOST_LOST) {
+        for (_, what, cells) in lost.into_iter().take(MAX_LOST) {
             let _ = writeln!(text, "| {what} |{}", bold(cells));
         }
         let (_, behind, pairs) = ahead(&self.results)?;

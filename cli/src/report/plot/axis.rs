@@ -19,7 +19,7 @@ pub(super) struct Axis {
 }
 
 /// Largest number of decades with a key point each.
-const MOST_DECADES: usize = 12;
+const MAX_DECADES: usize = 12;
 
 impl Axis {
     /// The axis from the least to the largest value, with some margin.
@@ -63,7 +63,7 @@ impl Ranged for Axis {
         let (low, high) = (self.ends.start.log10().floor() as i32, self.ends.end.log10().ceil() as i32);
         // Few decades have key points between them; many decades have key points at every nth.
         let steps: &[f64] = if high - low <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let every = ((high - low) as usize).div_ceil(MOST_DECADES).max(1);
+        let every = ((high - low) as usize).div_ceil(MAX_DECADES).max(1);
         let all = (low..=high).step_by(every).flat_map(|k| steps.iter().map(move |s| s * 10_f64.powi(k)));
         all.filter(|x| *x >= 0.999 * self.ends.start && *x <= 1.001 * self.ends.end).collect()
     }

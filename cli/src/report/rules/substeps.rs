@@ -20,12 +20,12 @@ fn largest(most: u32, mut stands: impl FnMut(u32) -> Result<bool>) -> Result<u32
     Ok(good)
 }
 
-const MOST_BOXES: u32 = 128;
+const MAX_BOXES: u32 = 128;
 
 pub(super) fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Substeps\n\nThe table has the tallest tower that stands for 20 s, up to {MOST_BOXES} boxes. Boxes are shifted by 1 cm alternately to both\n\
+        "\n## Substeps\n\nThe table has the tallest tower that stands for 20 s, up to {MAX_BOXES} boxes. Boxes are shifted by 1 cm alternately to both\n\
          sides. All islands take the same substeps.\n\n\
          | substeps | soft, default | Baumgarte, as many sweeps |\n|---|---|---|"
     );
@@ -33,7 +33,7 @@ pub(super) fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> 
         let mut tallest = |more: &str| {
             let settings = format!("substeps={substeps} max_substeps={substeps} {more}");
             let tallest =
-                largest(MOST_BOXES, |n| Ok(stand(&format!("tower:n={n},offset=0.01"), &settings)?.fell.is_none()))?;
+                largest(MAX_BOXES, |n| Ok(stand(&format!("tower:n={n},offset=0.01"), &settings)?.fell.is_none()))?;
             after_run();
             Result::Ok(tallest)
         };

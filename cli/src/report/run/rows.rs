@@ -4,7 +4,7 @@ use super::{RunReport, SensorCount};
 use drystone::stats::median;
 
 /// Up to this number of sensors, each one has a row.
-const MOST_SENSORS: usize = 20;
+const MAX_SENSORS: usize = 20;
 
 impl RunReport {
     pub fn rows(&self) -> Vec<(String, String)> {
@@ -39,11 +39,11 @@ impl RunReport {
             let sum = |of: fn(&SensorCount) -> u64| self.sensors.iter().map(of).sum::<u64>();
             let (entered, left) = (sum(|sensor| sensor.entered), sum(|sensor| sensor.left));
             row("sensors", format!("{}: {entered} times entered, {left} times left", self.sensors.len()));
-            for SensorCount { sensor, entered, left, inside, .. } in self.sensors.iter().take(MOST_SENSORS) {
+            for SensorCount { sensor, entered, left, inside, .. } in self.sensors.iter().take(MAX_SENSORS) {
                 row(&format!("  {sensor}"), format!("{entered} entered, {left} left, {inside} inside"));
             }
-            if self.sensors.len() > MOST_SENSORS {
-                row("  ...", format!("and {} more, in --json", self.sensors.len() - MOST_SENSORS));
+            if self.sensors.len() > MAX_SENSORS {
+                row("  ...", format!("and {} more, in --json", self.sensors.len() - MAX_SENSORS));
             }
         }
         if self.most_substeps > substeps {

@@ -18,9 +18,9 @@ const NEIGHBORHOOD: f64 = 1e-2;
 /// Number of refinements of a solution. With one less, 4 of 10 problems end at 1e-8 to 3e-8 and not below.
 const REFINEMENTS: usize = 3;
 /// A shorter step counts as blocked.
-const LEAST_LENGTH: f64 = 1e-9;
+const MIN_LENGTH: f64 = 1e-9;
 /// Smallest target of a step, as a share of the product.
-const LEAST_CENTERING: f64 = 1e-8;
+const MIN_CENTERING: f64 = 1e-8;
 
 /// An iterate.
 pub(super) struct Interior {
@@ -103,7 +103,7 @@ impl Interior {
         let length = self.longest(&predicted).min(1.0);
         let left = (self.moved(&predicted, length).mean_product() / before).clamp(0.0, 1.0);
         // Use no smaller target than the error requires: below it only rounding errors grow.
-        let centering = left.powi(3).max(LEAST_CENTERING).max((0.2 * tolerance / self.error).min(1.0));
+        let centering = left.powi(3).max(MIN_CENTERING).max((0.2 * tolerance / self.error).min(1.0));
 
         let trust = if self.careful { length } else { 1.0 };
         let corrected = points.iter().enumerate().map(|(i, p)| {
@@ -117,7 +117,7 @@ impl Interior {
         while !next.is_central() {
             length *= 0.8;
             // The iteration also ends here on NaN.
-            if length.is_nan() || length <= LEAST_LENGTH {
+            if length.is_nan() || length <= MIN_LENGTH {
                 return None;
             }
             next = self.moved(&direction, length);

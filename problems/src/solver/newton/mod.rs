@@ -36,7 +36,7 @@ const FIRST_STRIDES: usize = 8;
 /// Assumed number of Newton steps, for the comparison of the remaining work.
 const EXPECTED_STEPS: f64 = 20.0;
 /// Largest number of Newton steps.
-const MOST_STEPS: u32 = 100;
+const MAX_STEPS: u32 = 100;
 /// Number of steps in which the smallest error must fall by a tenth.
 const PATIENCE: u32 = 12;
 
@@ -212,7 +212,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
 /// Runs Newton steps until a reason to end occurs.
 fn follow(interior: &mut Interior, system: &mut impl System, tolerance: f64, best: &mut Outcome) -> NewtonEnded {
     let (mut milestone, mut since) = (f64::INFINITY, 0);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         if interior.step(system, tolerance).is_none() {
             return NewtonEnded::Blocked;
         }

@@ -14,7 +14,7 @@ const CENTER: usize = 1;
 const ROTATION: usize = 4;
 
 /// Number of poses of a body that are searched for an equal one.
-const MOST_PLACES: usize = 14;
+const MAX_PLACES: usize = 14;
 
 /// The sides of the computed pairs, body by body. Side `k` of pair `i` has the number `2 i + k`.
 struct Sides {
@@ -86,7 +86,7 @@ pub(super) fn walk_places_then<A: Archive>(
 /// the center is at the origin. Higher numbers count back to a known one.
 fn walk_place(place: &mut Placed, known: &mut Vec<Placed>, now: Option<&Body>, columns: &mut Columns) -> Result<()> {
     let is_same = |own: &Placed| bytemuck::bytes_of(own) == bytemuck::bytes_of(place);
-    let back = known.iter().rev().take(MOST_PLACES).position(is_same);
+    let back = known.iter().rev().take(MAX_PLACES).position(is_same);
     let mut which = back.map_or(u8::from(place.is_centered == 1.0), |back| back as u8 + 2);
     columns.byte(WHICH, &mut which)?;
     if let Some(back) = usize::from(which).checked_sub(2) {
