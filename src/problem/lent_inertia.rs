@@ -17,7 +17,7 @@ pub(super) type LentInertia = (u32, DMat3);
 const SWING_LIMIT: f64 = 3.0;
 
 /// h² times the rotational stiffness of a body under a joint at the arm `r` that pulls with `impulse` in a substep of
-/// `h` seconds: |r| |F| about axes perpendicular to the arm.
+/// `h` seconds: r·F about axes perpendicular to the arm where r·F is positive, otherwise 0. F is `impulse` / h.
 fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     let (r, impulse) = (r.as_dvec3(), impulse.as_dvec3());
     let tension = r.dot(impulse);

@@ -738,7 +738,7 @@ impl Body {
                 input!("density = {density} kg/m³: must be a number above 0")
             }
             Weight::Total(mass) if !MassProperties::MASSES.contains(&mass) => {
-                input!("total_mass = {mass:e} kg: must be 1e-15 to 1e15 kg")
+                input!("mass = {mass:e} kg: must be 1e-15 to 1e15 kg")
             }
             _ if self.mass.mass == 0.0 => input!("{error}; call Body::update_mass to compute the mass from the shapes"),
             _ => error,

@@ -107,7 +107,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("body 2 \"\": density = NaN kg/m³: must be a number above 0", |w| {
             w.add(cube().density(f32::NAN).named(""));
         }),
-        ("body 2 \"\": total_mass = -1e0 kg: must be", |w| {
+        ("body 2 \"\": mass = -1e0 kg: must be 1e-15 to 1e15 kg", |w| {
             w.add(cube().total_mass(-1.0).named(""));
         }),
         ("body 0 \"\": mass = ", |w| {

@@ -1,4 +1,4 @@
-//! Every kernel against its Rust double, pass by pass, on random problems.
+//! Every kernel against its Rust twin, pass by pass, on random problems.
 //!
 //! A driver compiles each variant of a kernel, over a thousand programs in all. Of the variants that differ in rules these tests run a
 //! covering array: any three rules meet in every combination that they have. `drystone conform` runs all of them, in both modes and forms.

@@ -267,6 +267,10 @@ fn a_mass_beyond_what_can_be_simulated_is_refused() {
         let line = refused_body(json!({"kind": "dynamic", "density": density, "shapes": shapes}));
         assert!(line.starts_with("mass = ") && line.contains("must be 1e-15 to 1e15 kg"), "{line}");
     }
+    for mass in [1e-16, 1e16] {
+        let line = refused_body(json!({"kind": "dynamic", "mass": mass}));
+        assert_eq!(line, format!("mass = {mass:e} kg: must be 1e-15 to 1e15 kg"));
+    }
 }
 
 #[test]

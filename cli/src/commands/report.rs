@@ -9,7 +9,7 @@ use super::progress::{PERCENT, Progress};
 use crate::adapter;
 use crate::files;
 use crate::report::comparison::{Extent, Origin, Report, Survey, Team, drystone, scene, scenes, tables};
-use crate::report::{RUNS, Shard, Solvers, convergence, performance, problems, rules, solvers};
+use crate::report::{Convergence, RUNS, Shard, Solvers, convergence, performance, problems, rules, solvers};
 use drystone::{Error, Result};
 
 #[derive(Args)]
@@ -48,7 +48,7 @@ enum Page {
     },
     /// Count the sweeps that contact problems need to reach an error.
     Convergence {
-        /// Directory for the page.
+        /// Directory for the page. Its folder convergence gets all rows as CSV, and the pictures.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
         /// Directory with contact problems, in addition to those of catalogue scenes.
@@ -123,19 +123,19 @@ impl ReportArgs {
                 // Refuse a bad table before anything runs.
                 let others = siconos.as_deref().map(solvers).transpose()?;
                 let (bar, mut done) = (Progress::steps(0, false), 0);
-                let mut page = convergence(problems.as_deref(), |problems| {
+                let Convergence { mut page, mut folder } = convergence(problems.as_deref(), |problems| {
                     done += 1;
                     bar.set(done, problems as u64);
                 })?;
                 bar.finish();
-                std::fs::create_dir_all(out).map_err(Error::file(out))?;
-                if let Some(Solvers { section, pictures }) = others {
+                if let Some(Solvers { section, folder: more }) = others {
                     page.push_str(&section);
-                    let folder = out.join("convergence");
-                    std::fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
-                    for (name, text) in pictures {
-                        files::write(&folder.join(name), text.as_bytes())?;
-                    }
+                    folder.extend(more);
+                }
+                let directory = out.join("convergence");
+                std::fs::create_dir_all(&directory).map_err(Error::file(&directory))?;
+                for (name, bytes) in folder {
+                    files::write(&directory.join(name), &bytes)?;
                 }
                 let path = out.join("convergence.md");
                 files::write(&path, page.as_bytes())?;

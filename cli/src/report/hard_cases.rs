@@ -41,9 +41,12 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
             passed[k] += usize::from(passes(&checks));
             columns.push(Some(checks));
         }
-        writeln!(rows, "| **{}** | {} ||||||||", case.name, case.summary).expect("text takes all");
         let asked = columns.iter().flatten().next().map_or(&[][..], |checks| checks);
-        for (i, check) in asked.iter().enumerate() {
+        let shown: Vec<_> = (0..asked.len()).filter(|&i| !is_zero(&columns, i)).collect();
+        let note = if shown.is_empty() { " (every quantity is 0)" } else { "" };
+        writeln!(rows, "| **{}** | {}{note} ||||||||", case.name, case.summary).expect("text takes all");
+        for i in shown {
+            let check = &asked[i];
             let cell = |check: &Check| match (number(check.value), check.passed) {
                 (value, true) => value,
                 (value, false) => format!("**{value}**"),
@@ -66,7 +69,8 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
         "# Hard cases\n\n\
          `drystone hard --page docs` makes this page. `drystone hard --case H3 --preset accurate` runs one case, and\n\
          `drystone hard --list` describes all. The columns are presets with their substeps on the CPU lanes in single precision\n\
-         (`cpu`), the reference in double precision (`f64`) and the shaders (`gpu`). Failures are in bold. The adapter is\n\
+         (`cpu`), the reference in double precision (`f64`) and the shaders (`gpu`). Failures are in bold. The table leaves out\n\
+         quantities that pass with 0 in every column. The adapter is\n\
          {gpu}.\n\n\
          | case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{}",
         heads.join(" | "),
@@ -74,6 +78,11 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
         totals.join(" | "),
         include_str!("hard_cases_tail.md")
     ))
+}
+
+/// Whether a quantity passes with 0 in every column that has the case.
+fn is_zero(columns: &[Option<Vec<Check>>], quantity: usize) -> bool {
+    columns.iter().flatten().map(|checks| &checks[quantity]).all(|check| check.passed && check.value == 0.0)
 }
 
 /// A number with three or four significant digits, or a whole number.
@@ -84,5 +93,18 @@ pub fn number(x: f64) -> String {
         format!("{x:.3}")
     } else {
         format!("{x:.1e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_quantity_that_passes_with_0_in_every_column_is_left_out() {
+        let check = |value, passed| Check { what: "a check".into(), value, limit: Limit::AtMost(1.0), passed };
+        let (zero, small, failed) = (check(0.0, true), check(1e-9, true), check(0.0, false));
+        let columns = [Some(vec![zero.clone(), zero.clone(), zero.clone()]), None, Some(vec![zero, small, failed])];
+        assert_eq!([0, 1, 2].map(|quantity| is_zero(&columns, quantity)), [true, false, false]);
     }
 }

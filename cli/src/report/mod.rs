@@ -21,7 +21,7 @@ mod solve;
 mod solvers;
 mod trajectory;
 
-pub use convergence::{convergence, problem_of_step, problems};
+pub use convergence::{Convergence, convergence, problem_of_step, problems};
 pub use performance::performance;
 pub use plot::engine_color;
 pub use rules::{RUNS, RulesReport, rules};

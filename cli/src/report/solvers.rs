@@ -1,6 +1,7 @@
 //! The section of docs/convergence.md on other solvers: a table of times, and performance profiles (Dolan and Moré
 //! 2002).
 
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,13 +9,14 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::plot::{Frame, Look, Scale, Series, svg};
+use crate::files;
 use drystone::{Error, Result};
 
 /// Name of this library's solver in the table.
 const OURS: &str = "drystone";
 
-/// Number of Siconos solvers with a line in a profile: there are colors for six lines.
-const LINES: usize = 5;
+/// Number of Siconos solvers in the table of solved problems, and in a profile: there are colors for six lines.
+const BEST: usize = 5;
 
 /// One solver on one problem, as written by benches/against_siconos.py; without a time if it did not reach the target.
 #[derive(Clone, Debug, Deserialize)]
@@ -28,11 +30,11 @@ struct Row {
     iterations: Option<u64>,
 }
 
-/// The section, and its pictures with file names.
+/// The section, and the files of the page's folder by their names: numbers of solved problems as CSV, and pictures.
 #[derive(Debug)]
 pub struct Solvers {
     pub section: String,
-    pub pictures: Vec<(String, String)>,
+    pub folder: Vec<(String, Vec<u8>)>,
 }
 
 /// Makes the section from a table.
@@ -47,8 +49,8 @@ pub fn solvers(path: &Path) -> Result<Solvers> {
     let mut section = include_str!("solvers_head.md").to_owned();
     summary(&mut section, &rows, &targets);
     times(&mut section, &rows, &targets);
-    solved(&mut section, &rows, &targets);
-    let mut pictures = Vec::new();
+    let table = solved(&mut section, &rows, &targets)?;
+    let mut folder = vec![("solvers.csv".to_owned(), table)];
     section.push_str("\n## Performance profiles\n\n");
     section.push_str("A line shows the share of problems that a solver solves within a multiple of the time of the fastest solver.\n\n");
     for target in &targets {
@@ -57,9 +59,9 @@ pub fn solvers(path: &Path) -> Result<Solvers> {
             section,
             "![share of problems over time relative to the fastest, to {target}](convergence/{name})"
         );
-        pictures.push((name, profile(&rows, target)));
+        folder.push((name, profile(&rows, target).into_bytes()));
     }
-    Ok(Solvers { section, pictures })
+    Ok(Solvers { section, folder })
 }
 
 /// Distinct words in the order of their first occurrence.
@@ -118,21 +120,37 @@ fn times(section: &mut String, rows: &[Row], targets: &[&str]) {
     }
 }
 
-/// Writes the number of problems that each solver solves.
-fn solved(section: &mut String, rows: &[Row], targets: &[&str]) {
-    section.push_str("\nProblems that each solver solves (for global solvers only global problems):\n\n| solver |");
+/// Writes the numbers of problems that drystone and the best other solvers solve. Returns those of all solvers as CSV.
+fn solved(section: &mut String, rows: &[Row], targets: &[&str]) -> Result<Vec<u8>> {
+    let count = |solver: &str, target: &str, is: fn(&&Row) -> bool| {
+        rows.iter().filter(|r| r.solver == solver && r.target == target).filter(is).count()
+    };
+    let solved = |solver: &str, target: &str| count(solver, target, |r| r.ms.is_some());
+    let solvers = in_order(rows.iter().map(|row| &row.solver));
+    let mut best: Vec<&str> = solvers.iter().copied().filter(|&solver| solver != OURS).collect();
+    best.sort_by_key(|solver| Reverse(targets.iter().map(|target| solved(solver, target)).sum::<usize>()));
+    best.truncate(BEST);
+
+    section.push_str(
+        "\nThe next table counts the problems that drystone and the best solvers of Siconos solve.\n\
+         [solvers.csv](convergence/solvers.csv) has all solvers. Global solvers take only global problems.\n\n| solver |",
+    );
     targets.iter().for_each(|target| section.push_str(&format!(" {target} |")));
     section.push_str(" of |\n|---|");
     targets.iter().for_each(|_| section.push_str("--:|"));
     section.push_str("--:|\n");
-    for solver in in_order(rows.iter().map(|row| &row.solver)) {
-        let of = |target: &str, is: fn(&&Row) -> bool| {
-            rows.iter().filter(|r| r.solver == solver && r.target == target).filter(is).count()
-        };
-        let counts: Vec<_> = targets.iter().map(|target| of(target, |r| r.ms.is_some()).to_string()).collect();
-        let all = targets.first().map_or(0, |target| of(target, |_| true));
-        let _ = writeln!(section, "| {solver} | {} | {all} |", counts.join(" | "));
+    let head = targets.iter().map(|target| format!("solved_to_{target}"));
+    let mut table = vec![std::iter::once("solver".to_owned()).chain(head).chain(["of".to_owned()]).collect::<Vec<_>>()];
+    for solver in solvers {
+        let mut cells = vec![solver.to_owned()];
+        cells.extend(targets.iter().map(|target| solved(solver, target).to_string()));
+        cells.push(targets.first().map_or(0, |target| count(solver, target, |_| true)).to_string());
+        if solver == OURS || best.contains(&solver) {
+            let _ = writeln!(section, "| {} |", cells.join(" | "));
+        }
+        table.push(cells);
     }
+    files::csv(&table)
 }
 
 /// Times of a solver relative to the fastest solver of each problem, ascending. Problems that it does not solve are
@@ -155,7 +173,7 @@ fn profile(rows: &[Row], target: &str) -> String {
     // Sort by solved problems, then by time.
     let rank = |solver: &str| {
         let ratios = ratios(rows, solver, target);
-        (std::cmp::Reverse(ratios.len()), ratios.iter().map(|r| r.ln()).sum::<f64>())
+        (Reverse(ratios.len()), ratios.iter().map(|r| r.ln()).sum::<f64>())
     };
     others.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).expect("times are numbers"));
     let line = |(look, solver): (usize, &str)| {
@@ -163,7 +181,7 @@ fn profile(rows: &[Row], target: &str) -> String {
         let line: Vec<_> = ratios(rows, solver, target).into_iter().enumerate().map(share).collect();
         Series { name: solver.into(), look: Look::nth(look), points: Vec::new(), line }
     };
-    let lines: Vec<_> = std::iter::once(OURS).chain(others.into_iter().take(LINES)).enumerate().map(line).collect();
+    let lines: Vec<_> = std::iter::once(OURS).chain(others.into_iter().take(BEST)).enumerate().map(line).collect();
     let title = format!("e_vel at most {target}");
     let frame = Frame {
         title: &title,
@@ -200,7 +218,7 @@ c,local,9,drystone,1e-4,3.0,7,1e-5
 
     #[test]
     fn the_section_says_what_was_faster_and_what_nothing_solved() {
-        let Solvers { section, pictures } = section(TABLE).expect("a section");
+        let Solvers { section, folder } = section(TABLE).expect("a section");
         for line in [
             "| 1e-4 | 3 | 2 | 0 | 1 |",
             "| a | global | 4 | 0.500 (0) | NSGS 2.000 (10) |",
@@ -209,8 +227,22 @@ c,local,9,drystone,1e-4,3.0,7,1e-5
         ] {
             assert!(section.contains(line), "{line} is not in: {section}");
         }
-        assert_eq!(pictures.len(), 1);
-        assert!(pictures[0].1.contains("NSGS") && pictures[0].1.contains("drystone"));
+        let [(table, counts), (picture, profile)] = &folder[..] else { panic!("{folder:?}") };
+        assert_eq!((table.as_str(), picture.as_str()), ("solvers.csv", "profile-1e-4.svg"));
+        assert_eq!(String::from_utf8_lossy(counts), "solver,solved_to_1e-4,of\nNSGS,2,3\nADMM,1,3\ndrystone,3,3\n");
+        let profile = String::from_utf8_lossy(profile);
+        assert!(profile.contains("NSGS") && profile.contains("drystone"));
+    }
+
+    #[test]
+    fn the_section_counts_for_the_best_solvers_and_the_file_for_all() {
+        let more = ["A", "B", "C", "D"].map(|solver| format!("a,global,4,{solver},1e-4,5.0,3,1e-5\n"));
+        let Solvers { section, folder } = section(&format!("{TABLE}{}", more.concat())).expect("a section");
+        for (solver, is_shown) in [("NSGS", true), ("ADMM", true), ("C", true), ("D", false), ("drystone", true)] {
+            let begins = format!("| {solver} | ");
+            assert_eq!(section.lines().any(|line| line.starts_with(&begins)), is_shown, "{solver} in {section}");
+        }
+        assert!(String::from_utf8_lossy(&folder[0].1).contains("\nD,1,1\n"));
     }
 
     #[test]

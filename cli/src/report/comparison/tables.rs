@@ -124,16 +124,8 @@ impl Rows {
             "engines" => self.engines(),
             "equal error" => self.equal_error(),
             "kinds" => self.kinds(),
-            "ahead" => {
-                let (table, lost, pairs) = ahead(&self.results)?;
-                Ok(format!(
-                    "{table}\nAnother engine is ahead somewhere in {lost} of {pairs} pairs of scene and error.\n"
-                ))
-            }
             "problems" => Ok(self.problems()),
-            _ => Err(Error::input(format!(
-                "unknown rows {name:?}: must be engines, equal error, kinds, ahead or problems"
-            ))),
+            _ => Err(Error::input(format!("unknown rows {name:?}: must be engines, equal error, kinds or problems"))),
         }
     }
 

@@ -1,12 +1,10 @@
-//! Friction rules: sliding, creep, spinning, and a hit.
+//! Friction rules: sliding, creep and spinning.
 
 use std::fmt::Write as _;
 
 use super::{DT, Line, RulesReport, simulate};
 use crate::report::plot::Scale;
-use drystone::metrics::{fastest, in_place, in_place_count};
 use drystone::{Body, Result, Shape, World};
-use drystone_scenes::Scene;
 use glam::{Quat, Vec3};
 
 /// Settings of a rule, with 8 substeps, so that the rule and not the length of the substep determines the motion.
@@ -47,8 +45,7 @@ pub(super) fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
         let creep = if creep > 1.0 { "slides off".into() } else { format!("{:.2} mm", creep * 1e3) };
         let _ = writeln!(report.page, "| {rule} | {} | {spread} | {creep} |", cells.join(" | "));
     }
-    spinning_plate(report, after_run)?;
-    thrown_ball(report, after_run)
+    spinning_plate(report, after_run)
 }
 
 /// Distance of the block of `world` from the origin after some steps (m).
@@ -113,38 +110,6 @@ fn sliding_spin(rule: &str, more: &str) -> Result<([f64; 3], Line)> {
         points.push((time, v));
     }
     Ok(([slides, spins, aside], points))
-}
-
-fn thrown_ball(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
-    let _ = writeln!(
-        report.page,
-        "\nIn the scene `throw` a ball hits a stack. The table counts boxes in place before the hit and at the end.\n\n\
-         | friction | before | at the end |\n|---|---|---|"
-    );
-    let scene = Scene::find("throw", &[])?;
-    for rule in ["none", "slip", "box", "disc"] {
-        let mut simulation = simulate(scene.world.clone(), &friction_settings(rule))?;
-        let thrown = fastest(&scene.world).1;
-        let boxes = scene.world.dynamic_count() - 1;
-        let speed = scene.world.bodies[thrown].linear_velocity.x;
-        // The hit is over when the ball has lost a tenth of its speed.
-        let (mut before, mut hit) = (boxes, false);
-        for _ in 0..scene.steps {
-            simulation.step(scene.dt)?;
-            hit |= simulation.world.bodies[thrown].linear_velocity.x / speed < 0.9;
-            if !hit {
-                before = standing_boxes(&scene.world, &simulation.world, thrown);
-            }
-        }
-        let end = standing_boxes(&scene.world, &simulation.world, thrown);
-        let _ = writeln!(report.page, "| {rule} | {before} of {boxes} | {end} of {boxes} |");
-        after_run();
-    }
-    Ok(())
-}
-
-fn standing_boxes(was: &World, is: &World, thrown: usize) -> usize {
-    in_place_count(was, is) - usize::from(in_place(&was.bodies[thrown], &is.bodies[thrown]))
 }
 
 #[cfg(test)]

@@ -85,7 +85,7 @@ fn stand(spec: &str, settings_text: &str) -> Result<Standing> {
     })
 }
 
-pub const RUNS: u64 = 9 + 3 + 16 + 4 + 4 + 8 + 8;
+pub const RUNS: u64 = 9 + 3 + 16 + 4 + 8 + 8;
 
 impl RulesReport {
     /// Adds a plot of named lines over time. A logarithmic scale leaves out values of 0 or less.
