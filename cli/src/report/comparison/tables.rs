@@ -409,7 +409,7 @@ mod tests {
         assert!(text.contains("| wall of 410 bricks | 1.00 ms, 2.00 mm | **0.500 ms, 1.00 mm** |\n"), "{text}");
         assert_eq!(rows.rewritten(&text).expect("a page"), text);
         for (page, message) in
-            [("<!-- rows: engine -->\n<!-- end of rows -->", "no rows"), ("<!-- rows: engines -->", "no end")]
+            [("<!-- rows: engine -->\n<!-- end of rows -->", "unknown rows"), ("<!-- rows: engines -->", "no end")]
         {
             assert!(rows.rewritten(page).expect_err(page).to_string().contains(message));
         }
