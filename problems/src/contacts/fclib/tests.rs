@@ -283,8 +283,8 @@ fn a_bad_file_is_refused_in_one_line_that_names_the_dataset() {
         ("H/n", Whole(vec![2_000_000_001]), "a contact is empty"),
         ("H/x", number("H/x", 0, 7.5), "angular rows do not follow from lever arms"),
         ("H/p", index("H/p", 0, 20), "contact"),
-        ("vectors/f", Real(vec![0.0; 17]), "[17], and 18 numbers"),
-        ("vectors/w", Real(vec![0.0; 22]), "[22], and 21 numbers"),
+        ("vectors/f", Real(vec![0.0; 17]), "[17], but 18 numbers"),
+        ("vectors/w", Real(vec![0.0; 22]), "[22], but 21 numbers"),
         ("vectors/w", number("vectors/w", 3, f64::INFINITY), "number 3 is inf"),
         ("vectors/mu", number("vectors/mu", 6, -0.5), "-0.5 of contact 6"),
     ] {
