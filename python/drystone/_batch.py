@@ -6,7 +6,7 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Self, TypeVar
@@ -115,8 +115,11 @@ class Snapshots:
 
         ValueError: the bytes are not a saved world, have another version, or are damaged or cut short.
         """
-        if isinstance(states, (bytes, bytearray)):
-            raise ValueError("states is bytes: must be a list of bytes, one a world")
+        if isinstance(states, (str, bytes, bytearray)) or not isinstance(states, Sequence):
+            raise ValueError(f"states is {type(states).__name__}: must be a list of bytes, one for each world")
+        for k, one in enumerate(states):
+            if not isinstance(one, (bytes, bytearray)):
+                raise ValueError(f"states[{k}] is {type(one).__name__}: must be bytes")
         return cls([_drystone.State.load(bytes(one)) for one in states])
 
     def to_bytes(self) -> list[bytes]:
@@ -147,11 +150,14 @@ class Snapshots:
     def __iter__(self) -> Iterator[Snapshots]:
         return (Snapshots([state]) for state in self._states)
 
+    def __repr__(self) -> str:
+        return f"<Snapshots of {len(self)} worlds>"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return Snapshots.from_bytes, (self.to_bytes(),)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Contacts:
     """Contacts of some worlds. The contacts of one world are contiguous, sorted by pairs of bodies, and so are the
     points of one contact.
@@ -179,7 +185,7 @@ class Contacts:
         >>> batch.contacts().of(1).bodies.tolist()
         [[0, 1], [1, 2]]
         """
-        if not 0 <= k < len(self.world_start) - 1:
+        if not 0 <= _check.whole("k", k) < len(self.world_start) - 1:
             raise ValueError(f"k = {k}: must be 0 to {len(self.world_start) - 2}")
         first, end = (int(n) for n in self.world_start[k : k + 2])
         points = slice(*(int(n) for n in self.point_start[[first, end]]))
@@ -195,8 +201,11 @@ class Contacts:
             self.point_impulse[points],
         )
 
+    def __repr__(self) -> str:
+        return f"<Contacts of {len(self.world_start) - 1} worlds: {len(self.bodies)} contacts, {len(self.point)} points>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Hits:
     """First hits of rays: `body` [w, R] (-1 without a hit), `distance` [w, R] (m; infinite without a hit), and
     `normal` [w, R, 3] (NaN without a hit).
@@ -205,6 +214,10 @@ class Hits:
     body: NDArray[np.int64]
     distance: Floats
     normal: Floats
+
+    def __repr__(self) -> str:
+        worlds, rays = self.body.shape
+        return f"<Hits of {rays} rays in {worlds} worlds: {(self.body >= 0).sum()} hits>"
 
 
 class Batch:
@@ -263,6 +276,7 @@ class Batch:
             of_scenes = of_scenes * (count if len(of_scenes) == 1 else 1)
             of_configs = of_configs * (count if len(of_configs) == 1 else 1)
         self._begin(_drystone.Batch.of_scenes(of_scenes, of_configs, count, threads), listen, hits_above)
+        self._scenes = scenes * (count if len(scenes) == 1 else 1)
 
     @classmethod
     def load(
@@ -295,10 +309,14 @@ class Batch:
     def _begin(self, batch: _drystone.Batch, listen: Collection[str] | None, hits_above: float) -> None:
         self._batch = batch
         self._process = os.getpid()
+        # The scene of each world, unknown for a batch of states.
+        self._scenes: list[Scene] = []
+        self._has_impulses = True
         self._lock = threading.RLock()
         self._worlds, self._bodies, self._joints, self._drives = batch.sizes()
         if listen is not None:
-            words = [_check.one_of("listen", word, LISTEN) for word in ([listen] if isinstance(listen, str) else listen)]
+            words = _check.words("listen", listen, LISTEN)
+            self._has_impulses = "impulses" in words
             above = _check.number("hits_above", hits_above) if "hits" in words else None
             batch.listen("contacts" in words, "impulses" in words, above)
         self._arrays = {name: np.full(self._shape(name), np.nan, np.float32) for name in (*VIEWS, *INPUTS)}
@@ -494,6 +512,35 @@ class Batch:
         """[W, J, 3] angular impulse on the second body in the last substep (N m s); a new array."""
         return self._column("joint_torque_impulse")
 
+    @property
+    def contact_impulse(self) -> Floats:
+        """[W, B, 3] sum of the impulses of all contacts on each body over the last step (N s); a new array. It has a fixed
+        shape, as a policy needs it; `contacts` has the single contacts.
+
+        ValueError: the batch does not listen to "impulses".
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 1, listen=["impulses"])
+        >>> batch.step(60)
+        >>> [round(60 * float(force)) for force in batch.contact_impulse[0, :, 1]]
+        [-19620, 9810, 9810]
+        """
+        if not self._has_impulses:
+            raise ValueError("contact_impulse: the batch does not listen to 'impulses'")
+        contacts, exists = self.contacts(), self.exists
+        of_world = np.repeat(np.arange(self._worlds), np.diff(contacts.world_start))
+        rows = of_world[:, None] * self._bodies + contacts.bodies
+        total = np.empty((self._worlds * self._bodies, 3))
+        for axis in range(3):
+            # Sums in the order of the contacts, which is the same on every machine.
+            on_first, on_second = (
+                np.bincount(rows[:, k], contacts.impulse[:, axis], len(total)) for k in range(2)
+            )
+            total[:, axis] = on_second - on_first
+        impulse = total.reshape(self._worlds, self._bodies, 3).astype(np.float32)
+        impulse[~exists] = np.nan
+        return impulse
+
     def _column(self, name: str) -> Floats:
         array = np.full(self._shape(name), np.nan, np.float32)
         self._alone(lambda: self._batch.read(np.arange(self._worlds), [(name, array)]))
@@ -503,8 +550,8 @@ class Batch:
         """Advance worlds by n steps of `dt` seconds; None is the step length of the scene. `worlds` is a mask [W] or
         ascending indices; None selects all.
 
-        WorldError: some worlds failed; all others completed the call. KeyboardInterrupt ends the call with every world
-        between two steps.
+        ValueError: an argument is invalid. WorldError: some worlds failed; all others completed the call.
+        KeyboardInterrupt: Ctrl-C ended the call; every world is between two steps.
 
         >>> import drystone as ds, numpy as np
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 3)
@@ -512,7 +559,10 @@ class Batch:
         >>> batch.steps.tolist()
         [3, 0, 3]
         """
-        self._run(n, 1, worlds, dt, None, {})
+        n = _check.whole("n", n)
+        chosen = _check.worlds(worlds, self._worlds)
+        length = None if dt is None else _step_length(dt)
+        _raise_failed(self._alone(lambda: self._run_alone(n, 1, chosen, length, None, {})), {})
 
     def rollout(
         self,
@@ -523,25 +573,68 @@ class Batch:
         record: Collection[str] = ("position",),
         worlds: ArrayLike | None = None,
         dt: float | None = None,
+        out: Mapping[str, NDArray[Any]] | None = None,
+        until: Callable[[Batch], ArrayLike] | None = None,
     ) -> dict[str, NDArray[Any]]:
         """Advance w worlds by n steps in one call, and record every `every`-th step: arrays [w, n // every, ...].
 
-        `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...),
-        measures (`measure`) and "hash". A WorldError has the records so far.
+        `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...) in
+        single precision, measures (`measure`) in double precision, and "hash" (uint64). `out` has arrays by name, which
+        the call fills and returns in place of new ones.
+
+        `until(batch)` returns a bool for each world, [W]. The call asks it after every `every` steps, and a world stops
+        when its value is True. Its later records are NaN (0 for "hash"). `steps` has the number of steps of each world.
+
+        ValueError: an argument is invalid. WorldError: some worlds failed; the error has the records so far.
+        KeyboardInterrupt: Ctrl-C ended the call; every world is between two steps.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
         >>> out = batch.rollout(30, every=10, record=("position", "kinetic_energy", "hash"))
         >>> out["position"].shape, out["hash"].shape, bool(out["hash"][0, 2] == batch.hash()[0])
         ((2, 3, 4, 3), (2, 3), True)
+        >>> batch.force[1, 3] = (9000, 0, 0)
+        >>> _ = batch.rollout(600, every=10, until=lambda batch: batch.position[:, 3, 1] < 2)
+        >>> bool(batch.steps[0] == 630), bool(batch.steps[1] < 630)
+        (True, True)
         """
         n, every = _check.whole("n", n), _check.whole("every", every, 1)
         chosen = _check.worlds(worlds, self._worlds)
+        length = None if dt is None else _step_length(dt)
         numbers = None if ctrl is None else self._controls(ctrl, len(chosen), n)
-        names = [record] if isinstance(record, str) else list(record)
-        records = {name: self._record(name, len(chosen), n // every) for name in names}
-        self._run(n, every, chosen, dt, numbers, records)
+        if until is not None and not callable(until):
+            raise ValueError(f"until is {type(until).__name__}: must be a function of a batch")
+        names = _check.words("record", record, [*COLUMNS, *MEASURES, "hash"])
+        given = self._given(names, out, len(chosen), n // every)
+        records = {name: given.get(name, self._record(name, len(chosen), n // every)) for name in names}
+        if until is None:
+            failed = self._alone(lambda: self._run_alone(n, every, chosen, length, numbers, records))
+        else:
+            failed = self._alone(lambda: self._run_until(n, every, chosen, length, numbers, records, until))
+        _raise_failed(failed, records)
         return records
+
+    def _given(
+        self, names: list[str], out: Mapping[str, NDArray[Any]] | None, worlds: int, rows: int
+    ) -> dict[str, NDArray[Any]]:
+        """The arrays of `out`, checked and without values."""
+        if out is None:
+            return {}
+        if not isinstance(out, Mapping):
+            raise ValueError(f"out is {type(out).__name__}: must be a dict of arrays")
+        used = dict(self._arrays)
+        for name, array in out.items():
+            label = f"out[{name!r}]"
+            _check.one_of("out", name, names)
+            wanted = self._record(name, 0, rows)
+            _check.output(label, array, (worlds, *wanted.shape[1:]), wanted.dtype)
+            for other, of in used.items():
+                if np.may_share_memory(array, of):
+                    raise ValueError(f"{label} shares memory with {other}: must have memory of its own")
+            used[label] = array
+        for name, array in out.items():
+            array.fill(0 if name == "hash" else np.nan)
+        return dict(out)
 
     def _controls(self, ctrl: ArrayLike, worlds: int, steps: int) -> Floats:
         array = np.asarray(ctrl)
@@ -552,30 +645,11 @@ class Batch:
         return np.ascontiguousarray(np.broadcast_to(numbers, (worlds, *array.shape[1:])))
 
     def _record(self, name: str, worlds: int, rows: int) -> NDArray[Any]:
-        _check.one_of("record", name, [*COLUMNS, *MEASURES, "hash"])
         if name == "hash":
             return np.zeros((worlds, rows), np.uint64)
         if name in MEASURES:
             return np.full((worlds, rows), np.nan)
         return np.full((worlds, rows, *self._shape(name)[1:]), np.nan, np.float32)
-
-    def _run(
-        self,
-        n: int,
-        every: int,
-        worlds: ArrayLike | None,
-        dt: float | None,
-        ctrl: Floats | None,
-        records: dict[str, NDArray[Any]],
-    ) -> None:
-        n = _check.whole("n", n)
-        chosen = _check.worlds(worlds, self._worlds)
-        length = None if dt is None else _step_length(dt)
-        failed = self._alone(lambda: self._run_alone(n, every, chosen, length, ctrl, records))
-        if failed:
-            error = WorldError(np.array([world for world, _ in failed]), [line for _, line in failed])
-            error.records = records
-            raise error
 
     def _run_alone(
         self,
@@ -599,6 +673,38 @@ class Batch:
                 self._batch.read(chosen, [("ctrl", self._arrays["ctrl"])])
         return failed
 
+    def _run_until(
+        self,
+        n: int,
+        every: int,
+        chosen: NDArray[np.int64],
+        dt: float | None,
+        ctrl: Floats | None,
+        records: dict[str, NDArray[Any]],
+        until: Callable[[Batch], ArrayLike],
+    ) -> list[tuple[int, str]]:
+        failed: list[tuple[int, str]] = []
+        # Rows of the worlds that still run.
+        rows = np.arange(len(chosen))
+        for first in range(0, n, every):
+            if not len(rows):
+                break
+            count = min(every, n - first)
+            steps = slice(0, 1) if ctrl is None or ctrl.shape[1] == 1 else slice(first, first + count)
+            own = None if ctrl is None else np.ascontiguousarray(ctrl[rows, steps])
+            parts = {name: self._record(name, len(rows), 1) for name in records} if count == every else {}
+            failed_now = self._run_alone(count, every, chosen[rows], dt, own, parts)
+            for name, part in parts.items():
+                records[name][rows, first // every] = part[:, 0]
+            is_over = np.asarray(until(self))
+            if is_over.shape != (self._worlds,) or is_over.dtype != bool:
+                given = f"shape {is_over.shape} and dtype {is_over.dtype}"
+                raise ValueError(f"until gives {given}: must be ({self._worlds},) bools")
+            is_over = is_over | np.isin(np.arange(self._worlds), [world for world, _ in failed_now])
+            rows = rows[~is_over[chosen[rows]]]
+            failed += failed_now
+        return sorted(failed)
+
     def apply_impulse(
         self,
         impulse: ArrayLike,
@@ -609,6 +715,8 @@ class Batch:
     ) -> None:
         """Apply impulses [w, b, 3] (N s) at once to some bodies of some worlds, through centers of mass or at points
         `at` [w, b, 3] (m).
+
+        ValueError: an argument is invalid.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -640,6 +748,8 @@ class Batch:
         """Set poses and velocities [w, b, 3 or 4] of some bodies of some worlds.
 
         Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`.
+
+        ValueError: an argument is invalid.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -839,6 +949,8 @@ class Batch:
     ) -> Hits:
         """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m).
 
+        ValueError: an argument is invalid.
+
         >>> import drystone as ds
         >>> hits = ds.Batch(ds.Scene.find("tower", n=2), 2).ray([[0, 9, 0]], [[0, -1, 0]])
         >>> hits.body.tolist(), hits.distance.tolist()
@@ -895,6 +1007,13 @@ class Batch:
 
     def __reduce__(self) -> tuple[Any, ...]:
         raise TypeError("a Batch is not pickled: send batch.save(), and load it by Batch.load")
+
+
+def _raise_failed(failed: list[tuple[int, str]], records: dict[str, NDArray[Any]]) -> None:
+    if failed:
+        error = WorldError(np.array([world for world, _ in failed]), [line for _, line in failed])
+        error.records = records
+        raise error
 
 
 def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:

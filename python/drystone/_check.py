@@ -65,6 +65,20 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.f
     return single
 
 
+def output(name: str, array: Any, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+    """An array that a call can fill."""
+    if not isinstance(array, np.ndarray):
+        raise ValueError(f"{name} is {type(array).__name__}: must be ndarray")
+    if array.dtype != dtype:
+        raise ValueError(f"{name} has dtype {array.dtype}: must be {dtype}")
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}: must be {shape}")
+    if not array.flags.c_contiguous:
+        raise ValueError(f"{name} is not contiguous: must be in C order")
+    if not array.flags.writeable:
+        raise ValueError(f"{name} is read-only: must be writable")
+
+
 def wanted(shape: tuple[int, ...]) -> str:
     """A shape in words."""
     words = ["any" if n == -1 else str(n) for n in shape]

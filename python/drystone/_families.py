@@ -159,7 +159,7 @@ def _label(settings: Settings) -> str:
     return ", ".join([str(settings.get("preset", "balanced")), *words])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stability:
     """The result of `drystone.survey.families`: the worlds that pass under each setting, and their price.
 
@@ -186,6 +186,10 @@ class Stability:
     def families(self) -> tuple[str, ...]:
         """The families in order."""
         return tuple(dict.fromkeys(row["family"] for row in self.rows))
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.rows)} worlds of {len(self.families)} families under {len(self.settings)} settings"
+        return f"<Stability: {sizes}>"
 
     def shares(self, *, together: bool = False) -> list[Row]:
         """The passing share of each family under each setting, or with `together` of all families in total.

@@ -54,7 +54,7 @@ class NotTheSame(RuntimeError):
         super().__init__(f"run {json.dumps(run)} gave {results[0]} on {machines[0]} and {results[1]} on {machines[1]}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Rows(Sequence[Row]):
     """The rows of a survey in the order of its runs. A row has `key`, the argument, and the result or `error`.
 
@@ -63,7 +63,7 @@ class Rows(Sequence[Row]):
     """
 
     rows: tuple[Row, ...]
-    who: tuple[Row, ...] = field(repr=False, default=())
+    who: tuple[Row, ...] = ()
 
     @overload
     def __getitem__(self, index: int) -> Row: ...
@@ -82,8 +82,13 @@ class Rows(Sequence[Row]):
         >>> ds.Rows(({"key": "a", "n": 1}, {"key": "b", "n": 2})).columns()["n"].tolist()
         [1, 2]
         """
-        names = dict.fromkeys(name for row in self.rows for name in row)
-        return {name: np.array([row.get(name) for row in self.rows]) for name in names}
+        return {name: np.array([row.get(name) for row in self.rows]) for name in self._names()}
+
+    def _names(self) -> dict[str, None]:
+        return dict.fromkeys(name for row in self.rows for name in row)
+
+    def __repr__(self) -> str:
+        return f"<Rows: {len(self)} rows of {len(self._names())} columns>"
 
 
 def survey(
