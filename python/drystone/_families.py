@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
 import math
 import os
@@ -15,7 +16,7 @@ import numpy as np
 
 from . import _check, _drystone
 from ._scene import Config
-from ._survey import Row, Rows, plain, survey
+from ._survey import Row, Rows, merge, plain, survey
 from .studies import color_of, text
 
 Settings = Mapping[str, Any]
@@ -79,8 +80,7 @@ def families(
     """
     chosen = _grid(settings)
     known = [name for name, _ in _drystone.family_names()]
-    names = known if family is None else [family] if isinstance(family, str) else list(family)
-    names = [_check.one_of("family", name, known) for name in names]
+    names = known if family is None else _check.words("family", family, known)
     numbers = _seeds(seeds)
     if not names:
         raise ValueError("family is empty: must have at least one name, or be None for all")
@@ -315,8 +315,7 @@ class Stability:
         >>> found.map_svg().count("<rect")
         1
         """
-        names = self.families if family is None else [family] if isinstance(family, str) else list(family)
-        names = [_check.one_of("family", name, self.families) for name in names]
+        names = list(self.families) if family is None else _check.words("family", family, self.families)
         cells: dict[tuple[str, int, int], list[bool]] = {}
         for row in self.rows:
             if row["family"] in names and "error" not in row:
@@ -355,11 +354,16 @@ class Stability:
 
 
 class _Surveys:
-    """`drystone.survey`, with `families` as an attribute."""
+    """`drystone.survey`, with `families` and `merge` as attributes."""
 
     __call__ = staticmethod(survey)
     families = staticmethod(families)
+    merge = staticmethod(merge)
     __doc__ = survey.__doc__
+    __signature__ = inspect.signature(survey)
+
+    def __repr__(self) -> str:
+        return "<function drystone.survey>"
 
 
 survey_with_families = _Surveys()
