@@ -28,13 +28,12 @@ def main(words: Sequence[str] | None = None) -> int:
 
     >>> import json, pathlib, tempfile
     >>> from drystone.shard import main
-    >>> with tempfile.TemporaryDirectory() as folder:
+    >>> with tempfile.TemporaryDirectory() as folder:  # doctest: +ELLIPSIS
     ...     runs, rows = pathlib.Path(folder, "runs.jsonl"), pathlib.Path(folder, "rows.jsonl")
     ...     _ = runs.write_text(json.dumps({"scene": "tower", "n": 2, "steps": 10}))
     ...     command = ["drystone.studies:stands", "--runs", str(runs), "--out", str(rows), "--engine", "here"]
-    ...     code, lines = main(command), len(rows.read_text().splitlines())
-    >>> code, lines
-    (0, 1)
+    ...     code = main(command)
+    1 rows, 0 with an error: ...rows.jsonl
     """
     parser = argparse.ArgumentParser("python -m drystone.shard", description="A part of a survey, or the merge of all parts.")
     parser.add_argument("run", metavar="MODULE:FUNCTION")
