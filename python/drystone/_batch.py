@@ -71,6 +71,15 @@ class WorldError(RuntimeError):
 
     `worlds` has their indices, and `messages` has one line for each. After `rollout`, `records` has the recorded
     values, and NaN for records that a world did not reach.
+
+    >>> import drystone as ds
+    >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 3)
+    >>> batch.force[1, 2] = (float("inf"), 0, 0)
+    >>> try:
+    ...     batch.step(10)
+    ... except ds.WorldError as error:
+    ...     print(error.worlds, batch.steps)
+    [1] [10  0 10]
     """
 
     def __init__(self, worlds: NDArray[np.int64], messages: list[str]) -> None:
@@ -114,6 +123,11 @@ class Snapshots:
         """Load states from the bytes of `Batch.save` or `to_bytes`.
 
         ValueError: the bytes are not a saved world, have another version, or are damaged or cut short.
+
+        >>> import drystone as ds
+        >>> saved = ds.Batch(ds.Scene.find("tower", n=3), 2).save()
+        >>> ds.Snapshots.from_bytes(saved)
+        <Snapshots of 2 worlds>
         """
         if isinstance(states, (str, bytes, bytearray)) or not isinstance(states, Sequence):
             raise ValueError(f"states is {type(states).__name__}: must be a list of bytes, one for each world")
@@ -165,6 +179,15 @@ class Contacts:
     `world_start` [w + 1], `bodies` [N, 2], `normal` [N, 3] from the first body to the second, `impulse` [N, 3] on the
     second body over the whole step (N s), `point_start` [N + 1], `point` [P, 3] (m), `separation` [P] (m),
     `point_impulse` [P] (N s). Impulses are zero unless the batch listens to "impulses".
+
+    >>> import drystone as ds
+    >>> batch = ds.Batch(ds.Scene.find("tower", n=2), listen=["impulses"])
+    >>> batch.step(60)
+    >>> contacts = batch.contacts()
+    >>> contacts
+    <Contacts of 1 worlds: 2 contacts, 8 points>
+    >>> contacts.bodies.tolist(), contacts.normal[1].round(3).tolist(), contacts.point_start.tolist()
+    ([[0, 1], [1, 2]], [0.0, 1.0, 0.0], [0, 4, 8])
     """
 
     world_start: NDArray[np.uint32]
@@ -209,6 +232,11 @@ class Contacts:
 class Hits:
     """First hits of rays: `body` [w, R] (-1 without a hit), `distance` [w, R] (m; infinite without a hit), and
     `normal` [w, R, 3] (NaN without a hit).
+
+    >>> import drystone as ds
+    >>> hits = ds.Batch(ds.Scene.find("tower", n=2)).ray([[0, 9, 0], [9, 9, 0]], [[0, -1, 0], [0, 1, 0]])
+    >>> hits.body.tolist(), hits.distance.tolist(), hits.normal[0, 0].tolist()
+    ([[2, -1]], [[7.0, inf]], [0.0, 1.0, 0.0])
     """
 
     body: NDArray[np.int64]
@@ -424,7 +452,15 @@ class Batch:
 
     @property
     def ctrl(self) -> Floats:
-        """[W, U] speed of each motor (m/s, rad/s) and target of each spring (m, rad); an input."""
+        """[W, U] speed of each motor (m/s, rad/s) and target of each spring (m, rad); an input. `Scene.actuators` has the
+        names.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("drawbridge"), 2)
+        >>> batch.ctrl[1] = 0.3
+        >>> batch.ctrl.shape, batch.ctrl[1].round(2).tolist()
+        ((2, 2), [0.30000001192092896, 0.30000001192092896])
+        """
         return self._arrays["ctrl"]
 
     @ctrl.setter
@@ -456,7 +492,12 @@ class Batch:
 
     @property
     def substeps(self) -> NDArray[np.uint32]:
-        """[W, B] substeps that a body takes in a step, 0 without a body; a new array."""
+        """[W, B] substeps that a body takes in a step, 0 without a body; a new array.
+
+        >>> import drystone as ds
+        >>> ds.Batch(ds.Scene.find("tower", n=2), config=ds.Config(substeps=5)).substeps.tolist()
+        [[5, 5, 5]]
+        """
         return self._body_flags()[2]
 
     def _body_flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.uint32]]:
@@ -482,7 +523,17 @@ class Batch:
 
     @property
     def joint_position(self) -> Floats:
-        """[W, J, 6] three lengths (m) and three angles (rad) of each joint; a new array."""
+        """[W, J, 6] three lengths (m) and three angles (rad) of each joint; a new array.
+
+        >>> import drystone as ds
+        >>> world = ds.World()
+        >>> bob = world.add(ds.Body.dynamic("bob").ball(0.1).at(1, 0, 0))
+        >>> world.join(ds.Joint(bob).hinge((0, 0, 1)).at(0, 0, 0))
+        >>> batch = ds.Batch(ds.Scene.from_world(world))
+        >>> batch.step(20)
+        >>> batch.joint_position.shape, int((abs(batch.joint_position) > 0.1).sum())
+        ((1, 1, 6), 1)
+        """
         return self._column("joint_position")
 
     @property
@@ -843,6 +894,13 @@ class Batch:
         """Continue worlds from states: one state for each world, one for all, or the indices of states in `source` [w].
 
         ValueError: the number of states is wrong, or a state has more bodies, joints or drives than the batch has rows.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("pile", n=8), 4)
+        >>> batch.step(9, worlds=[0])
+        >>> batch.restore(batch.snapshot([0, 1]), worlds=[1, 2, 3], source=[0, 1, 0])
+        >>> batch.steps.tolist()
+        [9, 9, 0, 9]
         """
         if not isinstance(snapshots, Snapshots):
             raise ValueError(f"snapshots is {type(snapshots).__name__}: must be Snapshots; Snapshots.from_bytes makes them of bytes")

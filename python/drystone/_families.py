@@ -344,6 +344,12 @@ class Stability:
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the table (families.md) and both pictures (families-price.svg, families-map.svg) into a folder, and
         return their paths.
+
+        >>> import drystone as ds, tempfile
+        >>> found = ds.survey.families([{"preset": "fast"}], family="slopes", seeds=2, engine="here")
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     print([path.name for path in found.write(folder)])
+        ['families.md', 'families-price.svg', 'families-map.svg']
         """
         files = {"families.md": self.table() + "\n", "families-price.svg": self.price_svg(), "families-map.svg": self.map_svg()}
         made = Path(folder)

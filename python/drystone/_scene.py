@@ -17,7 +17,13 @@ from ._build import World
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a scene: its default, its smallest and largest value, and whether it is a whole number."""
+    """A parameter of a scene: its default, its smallest and largest value, and whether it is a whole number.
+
+    >>> import drystone as ds
+    >>> tower = next(scene for scene in ds.scenes() if scene.name == "tower")
+    >>> tower.parameters[0].name, tower.parameters[0].whole
+    ('n', True)
+    """
 
     name: str
     default: float
@@ -29,7 +35,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """A scene of the catalogue."""
+    """A scene of the catalogue.
+
+    >>> import drystone as ds
+    >>> ds.scenes()[0].name in [scene.name for scene in ds.scenes()]
+    True
+    """
 
     name: str
     summary: str

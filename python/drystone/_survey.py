@@ -51,6 +51,14 @@ MAX_SEARCHES = 5
 class NotTheSame(RuntimeError):
     """Two computations of one run gave different results. `run` has its argument, `results` both results, and
     `machines` where they were computed.
+
+    >>> import drystone as ds, itertools
+    >>> counter = itertools.count()
+    >>> try:
+    ...     ds.survey(lambda run: {"n": next(counter)}, [{"k": 1}], engine="here", twice=1)
+    ... except ds.NotTheSame as error:
+    ...     print(error.run, error.results)
+    {'k': 1} ({'n': 0}, {'n': 1})
     """
 
     def __init__(self, run: Any, results: tuple[Any, Any], machines: tuple[str, str]) -> None:
@@ -64,6 +72,11 @@ class Rows(Sequence[Row]):
 
     `who` has the machine and process that computed each row, and the time (s). It is empty for rows from an earlier
     file.
+
+    >>> import drystone as ds
+    >>> rows = ds.survey(lambda run: {"square": run["n"] ** 2}, [{"n": 2}, {"n": 3}], engine="here")
+    >>> rows, rows[1]["square"], [row["n"] for row in rows]
+    (<Rows: 2 rows of 3 columns>, 9, [2, 3])
     """
 
     rows: tuple[Row, ...]

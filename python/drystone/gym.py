@@ -165,6 +165,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
     def state(self) -> bytes:
         """The state of all environments: worlds, inputs, episodes, seeds and memory. From it they continue with the
         same bits.
+
+        >>> from drystone.gym import cart_pole
+        >>> envs, others = cart_pole(2), cart_pole(2)
+        >>> _ = envs.reset(seed=1), others.reset(seed=7)
+        >>> others.set_state(envs.state())
+        >>> actions = envs.action_space.sample()
+        >>> bool((envs.step(actions)[0] == others.step(actions)[0]).all())
+        True
         """
         inputs = {name: getattr(self.batch, name).copy() for name in ("force", "torque", "ctrl", "gravity")}
         clocks = (list(self._seeds), self._episodes.copy(), self._elapsed.copy(), self._is_over.copy())
