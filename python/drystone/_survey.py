@@ -99,13 +99,24 @@ class Rows(Sequence[Row]):
         >>> ds.Rows(({"key": "a", "n": 1}, {"key": "b", "n": 2})).columns()["n"].tolist()
         [1, 2]
         """
-        return {name: np.array([row.get(name) for row in self.rows]) for name in self._names()}
+        return {name: _column([row.get(name) for row in self.rows]) for name in self._names()}
 
     def _names(self) -> dict[str, None]:
         return dict.fromkeys(name for row in self.rows for name in row)
 
     def __repr__(self) -> str:
         return f"<Rows: {len(self)} rows of {len(self._names())} columns>"
+
+
+def _column(values: list[Any]) -> np.ndarray[Any, Any]:
+    try:
+        return np.array(values)
+    except ValueError:
+        # Lists of several lengths, or lists and None.
+        column = np.empty(len(values), object)
+        for k, value in enumerate(values):
+            column[k] = value
+        return column
 
 
 def survey(
@@ -249,10 +260,12 @@ def _part(shard: Any, count: int) -> slice:
 
 def _plain_run(k: int, one: Any) -> dict[str, Any]:
     try:
-        plain: dict[str, Any] = json.loads(json.dumps(dict(one)))
+        argument: dict[str, Any] = json.loads(json.dumps(plain(dict(one))))
     except (TypeError, ValueError) as error:
         raise ValueError(f"runs[{k}] = {one!r}: must be a dict of numbers, strings and lists ({error})") from None
-    return plain
+    if "key" in argument:
+        raise ValueError(f"runs[{k}] has 'key': this name is for the key of a row")
+    return argument
 
 
 def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
@@ -286,6 +299,8 @@ def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | Non
         begin = time.perf_counter()
         try:
             result = plain(dict(run(dict(one))))
+            if "key" in result:
+                raise ValueError("the result has 'key': this name is for the key of a row")
         except Exception as error:
             if on_error == "raise":
                 raise
@@ -295,7 +310,7 @@ def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | Non
 
 
 def plain(value: Any) -> Any:
-    """A result in the form of JSON, with every number to the last bit."""
+    """An argument or a result in the form of JSON, with every number to the last bit."""
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
@@ -306,7 +321,7 @@ def plain(value: Any) -> Any:
         return [plain(one) for one in value]
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
-    raise TypeError(f"a result has {type(value).__name__}: must have numbers, strings and small arrays")
+    raise TypeError(f"{type(value).__name__}: must be numbers, strings and small arrays")
 
 
 def _same(a: Any, b: Any) -> bool:

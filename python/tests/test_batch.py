@@ -410,6 +410,19 @@ def test_ctrl_c_ends_a_rollout_between_two_steps() -> None:
     assert (same.hash() == batch.hash()).all() and np.array_equal(same.position, batch.position)
 
 
+def test_ctrl_c_ends_a_rollout_that_records_and_asks() -> None:
+    batch = ds.Batch(ds.Scene.find("pile", n=8), 2, config=ds.Config(sleep=False), num_threads=1)
+    for until in (None, lambda batch: np.zeros(2, bool)):
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            batch.rollout(10**6, every=1000, record="hash", until=until)
+        same = ds.Batch(ds.Scene.find("pile", n=8), 2, config=ds.Config(sleep=False))
+        for world, count in enumerate(batch.steps):
+            same.step(int(count), worlds=[world])
+        assert (same.hash() == batch.hash()).all() and np.array_equal(same.position, batch.position)
+        batch.reset()
+
+
 def test_contacts_events_rays_and_materials() -> None:
     batch = ds.Batch(ds.Scene.find("tower", n=3), 2, listen=["contacts", "impulses", "hits"], hits_above=0.1)
     batch.step()

@@ -149,7 +149,7 @@ def test_a_fleet_whose_actor_dies_has_the_hashes_of_one_batch(cluster) -> None:
     bad = np.zeros((7, 1, 2), np.float32)
     bad[[2, 5]] = 1e30
     for worlds in (batch, fleet):
-        with pytest.raises(ds.WorldError, match="^world 2: [^\n]* \(and 1 more\)$") as caught:
+        with pytest.raises(ds.WorldError, match=r"^world 2: [^\n]* \(and 1 more\)$") as caught:
             worlds.rollout(5, bad)
         # Numbers of the fleet, not of the actor.
         assert caught.value.worlds.tolist() == [2, 5] and len(caught.value.records["position"]) == 7

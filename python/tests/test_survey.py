@@ -96,6 +96,19 @@ def test_errors_are_rows_or_are_raised(tmp_path: Path) -> None:
             ds.survey(odd_fails, runs, engine=engine, workers=2, on_error="raise")
 
 
+def vectors(run: dict) -> dict:
+    if run["k"] == 2:
+        raise ValueError("no vector")
+    return {"vector": np.arange(3) * run["k"], "key": 1} if run["k"] == 3 else {"vector": np.arange(3) * run["k"]}
+
+
+def test_arguments_and_results_are_numpy_arrays_too() -> None:
+    rows = ds.survey(vectors, [{"k": k} for k in np.arange(4)], engine="here")
+    assert rows[3]["error"] == "ValueError: the result has 'key': this name is for the key of a row"
+    columns = rows.columns()
+    assert columns["k"].tolist() == [0, 1, 2, 3] and columns["vector"].tolist() == [[0, 0, 0], [0, 1, 2], None, None]
+
+
 def test_a_worker_that_dies_is_replaced_and_a_run_that_kills_is_named(tmp_path: Path) -> None:
     runs = [{"k": k, "folder": str(tmp_path)} for k in range(15)]
     rows = ds.survey(dies_once, runs, engine="processes", workers=2, chunk=2)
@@ -221,6 +234,7 @@ def test_a_survey_of_times_has_one_run_at_a_time() -> None:
         ({"chunk": 0}, "chunk = 0: must be 1 or more"),
         ({"on_error": "skip"}, "on_error = 'skip': must be one of row, raise"),
         ({"runs": [{"k": object}]}, None),
+        ({"runs": [{"key": 1}]}, "runs[0] has 'key': this name is for the key of a row"),
     ],
 )
 def test_wrong_arguments_are_named(options: dict, line: str | None) -> None:
