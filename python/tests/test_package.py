@@ -1,8 +1,11 @@
 """The package: documentation of every public name, modules that are found, the command."""
 
+import ast
 import inspect
+import re
 import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -51,3 +54,28 @@ def test_modules_are_found_without_an_import() -> None:
 def test_the_command_is_a_module_too() -> None:
     ran = subprocess.run([sys.executable, "-m", "drystone", "scenes"], capture_output=True, text=True)
     assert ran.returncode == 0 and "tower" in ran.stdout
+
+
+def test_the_programs_of_the_readme_call_what_there_is() -> None:
+    pytest.importorskip("gymnasium")
+    text = (Path(__file__).parents[1] / "README.md").read_text()
+    programs = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    of = {"ds": ds, "batch": ds.Batch, "found": ds.Stability}
+    names = set()
+    for node in (node for program in programs for node in ast.walk(ast.parse(program))):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in of:
+            # A field of a data class is no attribute of the class.
+            owner = of[node.value.id]
+            assert hasattr(owner, node.attr) or node.attr in getattr(owner, "__annotations__", {}), ast.unparse(node)
+            names.add(node.attr)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            inner = node.func
+            path = ast.unparse(inner).split(".")
+            if path[0] in of:
+                target = of[path[0]]
+                for name in path[1:]:
+                    target = getattr(target, name)
+                known = inspect.signature(target).parameters
+                loose = any(one.kind is one.VAR_KEYWORD for one in known.values())
+                assert loose or {word.arg for word in node.keywords} <= set(known), ast.unparse(node)
+    assert len(programs) >= 4 and {"Batch", "step", "survey", "table"} <= names
