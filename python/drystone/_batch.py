@@ -303,7 +303,12 @@ class Batch:
         if not is_one:
             of_scenes = of_scenes * (count if len(of_scenes) == 1 else 1)
             of_configs = of_configs * (count if len(of_configs) == 1 else 1)
-        self._begin(_drystone.Batch.of_scenes(of_scenes, of_configs, count, threads), listen, hits_above)
+        batch = _drystone.Batch.of_scenes(of_scenes, of_configs, count, threads)
+        words = _listen(batch, listen, hits_above)
+        if words:
+            # Worlds start from states that listen, so that a reset keeps what they report.
+            batch = _drystone.Batch.of_states(batch.states(np.arange(count)), threads)
+        self._begin(batch, "impulses" in words)
         self._scenes = scenes * (count if len(scenes) == 1 else 1)
 
     @classmethod
@@ -315,7 +320,8 @@ class Batch:
         listen: Collection[str] | None = None,
         hits_above: float = 0.5,
     ) -> Self:
-        """Load one world for each state of `save` or `snapshot`. A reset goes back to that state.
+        """Load one world for each state of `save` or `snapshot`. A reset goes back to that state. With `listen` None, each
+        world reports what its state listens to.
 
         ValueError: there is no state, or the bytes are not a saved world, have another version, or are damaged or cut
         short.
@@ -330,23 +336,23 @@ class Batch:
         """
         own = cls.__new__(cls)
         snapshots = states if isinstance(states, Snapshots) else Snapshots.from_bytes(states)
-        made = _drystone.Batch.of_states(snapshots._states, _check.whole("num_threads", num_threads))
-        own._begin(made, listen, hits_above)
+        threads = _check.whole("num_threads", num_threads)
+        batch = _drystone.Batch.of_states(snapshots._states, threads)
+        words = ["impulses"]
+        if listen is not None:
+            words = _listen(batch, listen, hits_above)
+            batch = _drystone.Batch.of_states(batch.states(np.arange(len(snapshots))), threads)
+        own._begin(batch, "impulses" in words)
         return own
 
-    def _begin(self, batch: _drystone.Batch, listen: Collection[str] | None, hits_above: float) -> None:
+    def _begin(self, batch: _drystone.Batch, has_impulses: bool) -> None:
         self._batch = batch
         self._process = os.getpid()
         # The scene of each world, unknown for a batch of states.
         self._scenes: list[Scene] = []
-        self._has_impulses = True
+        self._has_impulses = has_impulses
         self._lock = threading.RLock()
         self._worlds, self._bodies, self._joints, self._drives = batch.sizes()
-        if listen is not None:
-            words = _check.words("listen", listen, LISTEN)
-            self._has_impulses = "impulses" in words
-            above = _check.number("hits_above", hits_above) if "hits" in words else None
-            batch.listen("contacts" in words, "impulses" in words, above)
         self._arrays = {name: np.full(self._shape(name), np.nan, np.float32) for name in (*VIEWS, *INPUTS)}
         self._views = {name: _read_only(self._arrays[name]) for name in VIEWS}
         self._inputs = [(name, self._arrays[name]) for name in INPUTS]
@@ -567,6 +573,8 @@ class Batch:
     def contact_impulse(self) -> Floats:
         """[W, B, 3] sum of the impulses of all contacts on each body over the last step (N s); a new array. It has a fixed
         shape, as a policy needs it; `contacts` has the single contacts.
+
+        Impulses are zero in a world whose restored state does not listen to them.
 
         ValueError: the batch does not listen to "impulses".
 
@@ -891,7 +899,8 @@ class Batch:
     def restore(
         self, snapshots: Snapshots, worlds: ArrayLike | None = None, *, source: ArrayLike | None = None
     ) -> None:
-        """Continue worlds from states: one state for each world, one for all, or the indices of states in `source` [w].
+        """Continue worlds from states: one state for each world, one for all, or the indices of states in `source` [w]. A
+        state also has what its batch listened to.
 
         ValueError: the number of states is wrong, or a state has more bodies, joints or drives than the batch has rows.
 
@@ -914,6 +923,8 @@ class Batch:
 
         def restore() -> None:
             self._batch.restore(chosen, states)
+            # Whether the states listen is not known here.
+            self._has_impulses = True
             self._take(chosen, inputs=True)
 
         self._alone(restore)
@@ -1065,6 +1076,14 @@ class Batch:
 
     def __reduce__(self) -> tuple[Any, ...]:
         raise TypeError("a Batch is not pickled: send batch.save(), and load it by Batch.load")
+
+
+def _listen(batch: _drystone.Batch, listen: Collection[str], hits_above: float) -> list[str]:
+    """Select the data that steps report. Returns the words of `listen`."""
+    words = _check.words("listen", listen, LISTEN)
+    above = _check.number("hits_above", hits_above) if "hits" in words else None
+    batch.listen("contacts" in words, "impulses" in words, above)
+    return words
 
 
 def _raise_failed(failed: list[tuple[int, str]], records: dict[str, NDArray[Any]]) -> None:

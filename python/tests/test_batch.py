@@ -173,6 +173,33 @@ def test_a_rollout_fills_arrays_of_the_caller() -> None:
     assert all(np.array_equal(expected[name], found[name], equal_nan=True) for name in names)
 
 
+def test_a_reset_keeps_what_a_batch_listens_to() -> None:
+    scene = ds.Scene.find("tower", n=2)
+    config = ds.Config(sleep=False)
+    batch, deaf = ds.Batch(scene, 2, config=config, listen=["contacts", "impulses"]), ds.Batch(scene, 2, config=config)
+    assert (batch.hash() == deaf.hash()).all() and batch.steps.tolist() == [0, 0]
+    seen = []
+    for _ in range(3):
+        batch.step()
+        seen.append((batch.events().tolist(), batch.contact_impulse.tolist(), batch.hash().tolist()))
+        batch.step(30)
+        batch.reset()
+    assert seen[0] == seen[1] == seen[2] and len(seen[0][0]) == 4 and abs(np.array(seen[0][1])).max() > 10
+    deaf.step()
+    assert seen[0][2] == deaf.hash().tolist(), "to listen changes no bit"
+    batch.reset([1])
+    batch.set_material(worlds=[0], mass_scale=[[1, 1, 2]])
+    assert batch.mass_scale.tolist() == [[1, 1, 2], [1, 1, 1]]
+    # Loaded worlds listen as their states do, or as asked.
+    batch.step(9), deaf.step(9)
+    for states, listen, is_heard in [(batch, None, True), (deaf, None, False), (deaf, ("impulses",), True)]:
+        loaded = ds.Batch.load(states.save(), listen=listen)
+        for _ in range(2):
+            loaded.step(5)
+            assert (abs(loaded.contact_impulse).max() > 10) == is_heard
+            loaded.reset()
+
+
 def test_contact_impulses_of_bodies_are_sums_of_contacts() -> None:
     scenes = [ds.Scene.find("tower", n=2), ds.Scene.find("pile", n=8)]
     batch = ds.Batch(scenes, config=ds.Config(sleep=False), listen=["impulses"])
