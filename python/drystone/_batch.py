@@ -62,6 +62,8 @@ MEASURES = (
 )
 # Largest side of a picture (pixels).
 MAX_PIXELS = 8192
+# More threads than any machine has processors would only exhaust the system.
+MAX_THREADS = 1024
 LISTEN = ("contacts", "impulses", "hits")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
 
@@ -298,7 +300,7 @@ class Batch:
             raise ValueError(f"{given}: must be one, or one for each world")
         count = counts.pop() if counts else 1
         is_one = len(scenes) == len(configs) == 1
-        threads = _check.whole("num_threads", num_threads)
+        threads = _threads(num_threads)
         of_scenes, of_configs = ([one._scene for one in scenes], [one._config for one in configs])
         if not is_one:
             of_scenes = of_scenes * (count if len(of_scenes) == 1 else 1)
@@ -336,7 +338,7 @@ class Batch:
         """
         own = cls.__new__(cls)
         snapshots = states if isinstance(states, Snapshots) else Snapshots.from_bytes(states)
-        threads = _check.whole("num_threads", num_threads)
+        threads = _threads(num_threads)
         batch = _drystone.Batch.of_states(snapshots._states, threads)
         words = ["impulses"]
         if listen is not None:
@@ -484,7 +486,7 @@ class Batch:
 
     def _set_input(self, name: str, value: ArrayLike) -> None:
         array = self._arrays[name]
-        array[...] = _check.numbers(name, value, array.shape)
+        array[...] = _check.numbers(name, value, array.shape, lambda: np.isnan(self._column(name)))
 
     @property
     def exists(self) -> NDArray[np.bool_]:
@@ -788,7 +790,9 @@ class Batch:
         shape = (len(chosen), len(columns), 3)
         all_impulses = np.zeros((len(chosen), self._bodies, 3), np.float32)
         all_points = np.full_like(all_impulses, np.nan)
-        all_impulses[:, columns] = _check.numbers("impulse", impulse, shape)
+        given = _check.numbers("impulse", impulse, shape, lambda: ~self.exists[np.ix_(chosen, columns)][..., None])
+        # What is NaN is for bodies that a world does not have.
+        all_impulses[:, columns] = np.nan_to_num(given)
         if at is not None:
             all_points[:, columns] = _check.numbers("at", at, shape)
         self._alone(lambda: self._batch.apply_impulse(chosen, all_impulses, all_points))
@@ -806,9 +810,10 @@ class Batch:
     ) -> None:
         """Set poses and velocities [w, b, 3 or 4] of some bodies of some worlds.
 
-        Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`.
+        Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`. Rows of bodies that a world
+        does not have may be NaN, as in the arrays of the batch.
 
-        ValueError: an argument is invalid.
+        ValueError: an argument is invalid, or a rotation has no unit length.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -836,7 +841,8 @@ class Batch:
         """Set coefficients [w, b] of some bodies of some worlds, and the factor on their initial mass and moments of
         inertia. A reset sets the values of the scene. Bodies without mass stay without mass.
 
-        ValueError: a shape is wrong, or a mass is not 1e-15 to 1e15 kg.
+        ValueError: a shape is wrong, a friction is below 0, a restitution is not 0 to 1, or a mass is not 1e-15 to 1e15
+        kg.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -855,12 +861,13 @@ class Batch:
         checked: dict[str, Floats] = {}
         for name, value in values.items():
             if value is not None:
-                width = COLUMNS[name]
-                shape = (len(chosen), len(columns)) if width == 1 else (len(chosen), len(columns), width)
-                checked[name] = _check.numbers(name, value, shape).reshape(len(chosen), len(columns), width)
-        for name, numbers in checked.items():
-            whole = self._column(name)[chosen].reshape(len(chosen), self._bodies, COLUMNS[name])
-            whole[:, columns] = numbers
+                whole = self._column(name)[chosen]
+                shape = whole[:, columns].shape
+                numbers = _check.numbers(name, value, shape, partial(np.isnan, whole[:, columns]))
+                _check_range(name, numbers)
+                whole[:, columns] = numbers
+                checked[name] = whole.reshape(len(chosen), self._bodies, COLUMNS[name])
+        for name, whole in checked.items():
             self._alone(partial(self._batch.write, chosen, name, whole))
         self._alone(lambda: self._take(chosen))
 
@@ -1016,7 +1023,8 @@ class Batch:
     def ray(
         self, origin: ArrayLike, direction: ArrayLike, max_distance: float = 1e6, *, worlds: ArrayLike | None = None
     ) -> Hits:
-        """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m).
+        """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m). A direction can
+        have any length but zero, and a distance is in meters.
 
         ValueError: an argument is invalid.
 
@@ -1030,6 +1038,8 @@ class Batch:
         if rays[0].shape != rays[1].shape:
             raise ValueError(f"origin has shape {rays[0].shape} and direction {rays[1].shape}: must be the same")
         most, shape = _check.number("max_distance", max_distance), rays[0].shape
+        if most < 0:
+            raise ValueError(f"max_distance = {most}: must be 0 or more")
         body = np.full(shape[:2], -1, np.int64)
         distance, normal = np.full(shape[:2], np.inf, np.float32), np.full(shape, np.nan, np.float32)
         self._alone(lambda: self._batch.ray(chosen, rays[0], rays[1], most, body, distance, normal))
@@ -1063,10 +1073,11 @@ class Batch:
 
     @staticmethod
     def _rays(name: str, value: ArrayLike, worlds: int) -> Floats:
-        if np.ndim(value) == 2:
-            rays = _check.numbers(name, value, (-1, 3))
-            return np.ascontiguousarray(np.broadcast_to(rays, (worlds, *rays.shape)))
-        return _check.numbers(name, value, (worlds, -1, 3))
+        is_flat = np.ndim(value) == 2
+        rays = _check.numbers(name, value, (-1, 3) if is_flat else (worlds, -1, 3))
+        if name == "direction":
+            _check.rows_within(name, rays, rays.any(axis=-1), "have a length")
+        return np.ascontiguousarray(np.broadcast_to(rays, (worlds, *rays.shape))) if is_flat else rays
 
     def __len__(self) -> int:
         return self._worlds
@@ -1104,6 +1115,23 @@ def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:
     if not values:
         raise ValueError(f"{name} is empty: must have at least one {kind.__name__}")
     return list(values)
+
+
+def _check_range(name: str, rows: Floats) -> None:
+    """The ranges of columns that `set_state` and `set_material` write. Rows that no body has are NaN."""
+    if name == "rotation":
+        _check.rows_within(name, rows, ~(abs(np.linalg.norm(rows, axis=-1) - 1) > 1e-3), "have unit length")
+    elif name == "friction":
+        _check.rows_within(name, rows, ~(rows < 0), "be 0 or more")
+    elif name == "restitution":
+        _check.rows_within(name, rows, ~((rows < 0) | (rows > 1)), "be 0 to 1")
+
+
+def _threads(count: Any) -> int:
+    threads = _check.whole("num_threads", count)
+    if threads > MAX_THREADS:
+        raise ValueError(f"num_threads = {threads}: must be at most {MAX_THREADS}")
+    return threads
 
 
 def _side(name: str, pixels: Any) -> int:

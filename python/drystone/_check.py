@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import operator
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -44,8 +44,15 @@ def number(name: str, value: Any) -> float:
     return result
 
 
-def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Finite numbers in a new array of single precision. A length of -1 in the shape can be any length."""
+def numbers(
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int, ...],
+    absent: Callable[[], NDArray[np.bool_]] | None = None,
+) -> NDArray[np.float32]:
+    """Finite numbers in a new array of single precision. A length of -1 in the shape can be any length. `absent` tells
+    which numbers may be NaN, because a world has no such body or drive.
+    """
     try:
         array = np.asarray(value)
     except ValueError:
@@ -57,12 +64,23 @@ def numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.f
         raise ValueError(f"{name} has shape {array.shape}: must be {wanted(shape)}")
     with np.errstate(over="ignore"):
         single = np.array(array, np.float32, order="C")
-    bad = np.argwhere(~np.isfinite(single))
+    is_bad = ~np.isfinite(single)
+    if is_bad.any() and absent is not None:
+        is_bad &= ~(absent() & np.isnan(single))
+    bad = np.argwhere(is_bad)
     if len(bad):
         place = tuple(int(i) for i in bad[0])
         at = "" if not place else str(list(place))
         raise ValueError(f"{name}{at} = {array[place]}: must be finite")
     return single
+
+
+def rows_within(name: str, rows: NDArray[np.float32], is_within: NDArray[np.bool_], words: str) -> None:
+    """Numbers or rows of numbers that hold a condition."""
+    bad = np.argwhere(~is_within)
+    if len(bad):
+        place = tuple(int(i) for i in bad[0])
+        raise ValueError(f"{name}{list(place)} = {rows[place].tolist()}: must {words}")
 
 
 def output(name: str, array: Any, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:

@@ -109,6 +109,28 @@ def test_worlds_of_several_sizes_and_settings() -> None:
     assert batch.hash()[2] == alone.hash()[0]
 
 
+def test_arrays_of_worlds_of_several_sizes_can_be_written_back() -> None:
+    scenes = [ds.Scene.find("tower", n=2), ds.Scene.find("drawbridge"), ds.Scene.find("tower", n=4)]
+    batch = ds.Batch(scenes)
+    batch.step(5)
+    before = batch.hash()
+    batch.set_state(position=batch.position, rotation=batch.rotation, linear_velocity=batch.linear_velocity)
+    batch.set_material(friction=batch.friction, mass_scale=batch.mass_scale)
+    batch.force, batch.ctrl = batch.force + 0, batch.ctrl * 1
+    batch.apply_impulse(batch.position * 0)
+    assert (batch.hash() == before).all() and np.isnan(batch.ctrl[0]).all()
+    batch.step(5)
+    same = ds.Batch(scenes)
+    same.step(10)
+    assert (batch.hash() == same.hash()).all()
+    wrong = batch.position.copy()
+    wrong[0, 1, 1] = np.nan
+    with pytest.raises(ValueError, match=r"^position\[0, 1, 1\] = nan: must be finite$"):
+        batch.set_state(position=wrong)
+    with pytest.raises(ValueError, match=r"^ctrl\[1, 1\] = nan: must be finite$"):
+        batch.ctrl = [[np.nan] * 2, [0, np.nan], [np.nan] * 2]
+
+
 def test_a_rollout_records_what_steps_give() -> None:
     scene = ds.Scene.find("drawbridge")
     ctrl = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 24, 2)).astype(np.float32)
@@ -308,9 +330,15 @@ READ_ONLY.flags.writeable = False
         (lambda: BATCH.set_state(position=np.zeros((8, 1, 3))), f"position has shape (8, 1, 3): must be (8, {B}, 3)"),
         (lambda: BATCH.restore(BATCH.snapshot([0, 1])), "snapshots has 2 states: must be 1 or 8"),
         (lambda: BATCH.restore(b"", [0]), "snapshots is bytes: must be Snapshots; Snapshots.from_bytes makes them of bytes"),
+        (lambda: BATCH.ray([[0, 0, 0]], [[0, 0, 0]]), "direction[0] = [0.0, 0.0, 0.0]: must have a length"),
+        (lambda: BATCH.ray([[0, 0, 0]], [[0, 1, 0]], -1), "max_distance = -1.0: must be 0 or more"),
+        (lambda: BATCH.set_state(worlds=[1], bodies=[1], rotation=[[[0, 0, 0, 2]]]), "rotation[0, 0] = [0.0, 0.0, 0.0, 2.0]: must have unit length"),
+        (lambda: BATCH.set_material(worlds=[1], bodies=[1], friction=[[-1]]), "friction[0, 0] = -1.0: must be 0 or more"),
+        (lambda: BATCH.set_material(worlds=[1], bodies=[1], restitution=[[2]]), "restitution[0, 0] = 2.0: must be 0 to 1"),
         (lambda: BATCH.ray([[0, 0]], [[0, 0]]), "origin has shape (1, 2): must be (any, 3)"),
         (lambda: ds.Batch.load([b"drystone"]), "a saved world of a batch cannot be loaded: cut short"),
         (lambda: ds.Batch.load([BATCH.save()[0][:-1]]), None),
+        (lambda: ds.Batch(ds.Scene.find("tower"), num_threads=1025), "num_threads = 1025: must be at most 1024"),
         (lambda: ds.Batch("tower"), "scene is str: must be Scene or a list of Scene"),
         (lambda: ds.Batch([]), "scene is empty: must have at least one Scene"),
         (lambda: ds.Batch(ds.Scene.find("tower"), 0), "num_worlds = 0: must be 1 or more"),
