@@ -310,8 +310,7 @@ class Batch:
         if words:
             # Worlds start from states that listen, so that a reset keeps what they report.
             batch = _drystone.Batch.of_states(batch.states(np.arange(count)), threads)
-        self._begin(batch, "impulses" in words)
-        self._scenes = scenes * (count if len(scenes) == 1 else 1)
+        self._begin(batch, "impulses" in words, scenes * (count if len(scenes) == 1 else 1))
 
     @classmethod
     def load(
@@ -344,14 +343,14 @@ class Batch:
         if listen is not None:
             words = _listen(batch, listen, hits_above)
             batch = _drystone.Batch.of_states(batch.states(np.arange(len(snapshots))), threads)
-        own._begin(batch, "impulses" in words)
+        own._begin(batch, "impulses" in words, [])
         return own
 
-    def _begin(self, batch: _drystone.Batch, has_impulses: bool) -> None:
+    def _begin(self, batch: _drystone.Batch, has_impulses: bool, scenes: list[Scene]) -> None:
         self._batch = batch
         self._process = os.getpid()
         # The scene of each world, unknown for a batch of states.
-        self._scenes: list[Scene] = []
+        self._scenes = scenes
         self._has_impulses = has_impulses
         self._lock = threading.RLock()
         self._worlds, self._bodies, self._joints, self._drives = batch.sizes()
@@ -1076,7 +1075,7 @@ class Batch:
         is_flat = np.ndim(value) == 2
         rays = _check.numbers(name, value, (-1, 3) if is_flat else (worlds, -1, 3))
         if name == "direction":
-            _check.rows_within(name, rays, rays.any(axis=-1), "have a length")
+            _check.rows_within(name, rays, np.asarray(rays.any(axis=-1)), "have a length")
         return np.ascontiguousarray(np.broadcast_to(rays, (worlds, *rays.shape))) if is_flat else rays
 
     def __len__(self) -> int:

@@ -61,6 +61,7 @@ def families(
     workers: int | None = None,
     chunk: int | None = None,
     twice: float = 0.01,
+    timing: bool = False,
     on_error: str = "row",
     progress: bool | None = None,
 ) -> Stability:
@@ -96,6 +97,7 @@ def families(
         chunk=chunk,
         twice=twice,
         timed=TIMED,
+        timing=timing,
         on_error=on_error,
         progress=progress,
     )

@@ -65,6 +65,9 @@ class NotTheSame(RuntimeError):
         self.run, self.results, self.machines = run, results, machines
         super().__init__(f"run {json.dumps(run)} gave {results[0]} on {machines[0]} and {results[1]} on {machines[1]}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return NotTheSame, (self.run, self.results, self.machines)
+
 
 @dataclass(frozen=True, repr=False)
 class Rows(Sequence[Row]):

@@ -641,8 +641,8 @@ def cart_on_drawbridge(
         batch.set_state(worlds=[world], bodies=[deck], position=[[place]], rotation=[[rotation]])
 
     def reward(batch: Batch, actions: NDArray[Any]) -> NDArray[Any]:
-        ahead: NDArray[Any] = batch.linear_velocity[:, cart, 0] * (skip * scene.dt)
-        return ahead + 10 * is_over(batch)
+        rewards: NDArray[Any] = batch.linear_velocity[:, cart, 0] * (skip * scene.dt) + 10 * is_over(batch)
+        return rewards
 
     return VectorEnv(
         batch,
@@ -666,4 +666,4 @@ for _name, _make in {
     "Maze": maze,
     "CartOnDrawbridge": cart_on_drawbridge,
 }.items():
-    gymnasium.register(f"drystone/{_name}-v0", partial(Env, _make), vector_entry_point=_make)
+    gymnasium.register(f"drystone/{_name}-v0", partial(Env, _make), vector_entry_point=f"{__name__}:{_make.__name__}")

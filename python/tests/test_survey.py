@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -122,6 +123,8 @@ def test_results_that_differ_are_found(tmp_path: Path) -> None:
     with pytest.raises(ds.NotTheSame, match=r'^run \{"k": 0\} gave .* on .*:\d+ and .* on .*:\d+$') as caught:
         ds.survey(by_process, [{"k": 0}], engine="processes", workers=2, twice=1)
     machines = caught.value.machines
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert str(again) == str(caught.value) and again.machines == machines
     assert machines[0] != machines[1] and f":{caught.value.results[0]['process']}" in machines[0]
     with pytest.raises(ds.NotTheSame):
         ds.survey(by_clock, [{"k": 0}], engine="here", twice=1)
