@@ -254,7 +254,8 @@ class Batch:
     """W independent worlds with up to B bodies, J joints and U actuators.
 
     `scene` and `config` are one value for all worlds, or one for each world. `num_threads` 0 uses all processors.
-    `listen` selects the data that steps report: "contacts" and "hits" for `events`, "impulses" for `contacts`.
+    `listen` selects the data that steps report: "contacts" and "hits" for `events`, "impulses" for `contacts` and
+    `contact_impulse`. `hits_above` is the least speed of a reported hit (m/s).
 
     The bits of a world depend only on its scene, settings and inputs. They do not depend on W, the other worlds, the
     order of calls to others, threads or the machine. A call does not change worlds that it does not name. After a fork
@@ -308,7 +309,7 @@ class Batch:
         batch = _drystone.Batch.of_scenes(of_scenes, of_configs, count, threads)
         words = _listen(batch, listen, hits_above)
         if words:
-            # Worlds start from states that listen, so that a reset keeps what they report.
+            # The start states must listen too, because a reset restores them.
             batch = _drystone.Batch.of_states(batch.states(np.arange(count)), threads)
         self._begin(batch, "impulses" in words, scenes * (count if len(scenes) == 1 else 1))
 
@@ -321,8 +322,8 @@ class Batch:
         listen: Collection[str] | None = None,
         hits_above: float = 0.5,
     ) -> Self:
-        """Load one world for each state of `save` or `snapshot`. A reset goes back to that state. With `listen` None, each
-        world reports what its state listens to.
+        """Load one world for each state of `save` or `snapshot`. A reset goes back to that state. With `listen` None,
+        each world keeps the `listen` of its state.
 
         ValueError: there is no state, or the bytes are not a saved world, have another version, or are damaged or cut
         short.
@@ -459,8 +460,8 @@ class Batch:
 
     @property
     def ctrl(self) -> Floats:
-        """[W, U] speed of each motor (m/s, rad/s) and target of each spring (m, rad); an input. `Scene.actuators` has the
-        names.
+        """[W, U] speed of each motor (m/s, rad/s) and target of each spring (m, rad); an input. `Scene.actuators` has
+        the names.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("drawbridge"), 2)
@@ -572,8 +573,8 @@ class Batch:
 
     @property
     def contact_impulse(self) -> Floats:
-        """[W, B, 3] sum of the impulses of all contacts on each body over the last step (N s); a new array. It has a fixed
-        shape, as a policy needs it; `contacts` has the single contacts.
+        """[W, B, 3] sum of the impulses of all contacts on each body over the last step (N s); a new array. Its shape
+        is fixed, for observations of policies. `contacts` has the single contacts.
 
         Impulses are zero in a world whose restored state does not listen to them.
 
@@ -639,8 +640,8 @@ class Batch:
         """Advance w worlds by n steps in one call, and record every `every`-th step: arrays [w, n // every, ...].
 
         `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...) in
-        single precision, measures (`measure`) in double precision, and "hash" (uint64). `out` has arrays by name, which
-        the call fills and returns in place of new ones.
+        single precision, measures (`measure`) in double precision, and "hash" (uint64). `out` has arrays by name. The
+        call fills and returns them in place of new ones.
 
         `until(batch)` returns a bool for each world, [W]. The call asks it after every `every` steps, and a world stops
         when its value is True. Its later records are NaN (0 for "hash"). `steps` has the number of steps of each world.
@@ -790,7 +791,7 @@ class Batch:
         all_impulses = np.zeros((len(chosen), self._bodies, 3), np.float32)
         all_points = np.full_like(all_impulses, np.nan)
         given = _check.numbers("impulse", impulse, shape, lambda: ~self.exists[np.ix_(chosen, columns)][..., None])
-        # What is NaN is for bodies that a world does not have.
+        # Rows of absent bodies can be NaN.
         all_impulses[:, columns] = np.nan_to_num(given)
         if at is not None:
             all_points[:, columns] = _check.numbers("at", at, shape)
@@ -809,8 +810,8 @@ class Batch:
     ) -> None:
         """Set poses and velocities [w, b, 3 or 4] of some bodies of some worlds.
 
-        Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`. Rows of bodies that a world
-        does not have may be NaN, as in the arrays of the batch.
+        Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`. Rows of bodies that a
+        world does not have may be NaN, as in the arrays of the batch.
 
         ValueError: an argument is invalid, or a rotation has no unit length.
 
@@ -905,8 +906,8 @@ class Batch:
     def restore(
         self, snapshots: Snapshots, worlds: ArrayLike | None = None, *, source: ArrayLike | None = None
     ) -> None:
-        """Continue worlds from states: one state for each world, one for all, or the indices of states in `source` [w]. A
-        state also has what its batch listened to.
+        """Continue worlds from states: one state for each world, one for all, or the indices of states in `source` [w].
+        A state includes the `listen` of its batch.
 
         ValueError: the number of states is wrong, or a state has more bodies, joints or drives than the batch has rows.
 
@@ -929,7 +930,7 @@ class Batch:
 
         def restore() -> None:
             self._batch.restore(chosen, states)
-            # Whether the states listen is not known here.
+            # The states may listen to impulses.
             self._has_impulses = True
             self._take(chosen, inputs=True)
 
@@ -1022,8 +1023,8 @@ class Batch:
     def ray(
         self, origin: ArrayLike, direction: ArrayLike, max_distance: float = 1e6, *, worlds: ArrayLike | None = None
     ) -> Hits:
-        """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m). A direction can
-        have any length but zero, and a distance is in meters.
+        """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m). A direction
+        can have any length but zero, and a distance is in meters.
 
         ValueError: an argument is invalid.
 

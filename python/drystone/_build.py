@@ -95,8 +95,8 @@ class Body:
         return self.shape("mesh", vertices=corners, triangles=_indices("triangles", triangles, len(corners)), **keys)
 
     def height_field(self, heights: ArrayLike, scale: Vector, **keys: Any) -> Self:
-        """Add a height field to a fixed or kinematic body. `heights` has rows along z of heights along x. `scale` has the
-        length along x (m), the unit of heights (m), and the length along z (m).
+        """Add a height field to a fixed or kinematic body. `heights` has rows along z of heights along x. `scale` has
+        the length along x (m), the unit of heights (m), and the length along z (m).
         """
         rows = _check.numbers("heights", heights, (-1, -1))
         return self.shape("height_field", heights=rows, scale=_check.vector("scale", scale), **keys)
@@ -212,8 +212,8 @@ class Joint:
         return self._set(type="distance", limits=[_check.number("low", low), _check.number("high", high)])
 
     def generic(self, linear: Sequence[Mapping[str, Any]], angular: Sequence[Mapping[str, Any]], **keys: Any) -> Self:
-        """Make a joint with three axes of translation and three of rotation. An axis is a dict: free if empty, else with
-        `locked`, `limits`, `motor` or `spring`. Further keys are `frame` and `frames` (docs/scene-files.md).
+        """Make a joint with three axes of translation and three of rotation. An axis is a dict: free if empty, else
+        with `locked`, `limits`, `motor` or `spring`. Further keys are `frame` and `frames` (docs/scene-files.md).
 
         >>> import drystone as ds
         >>> ds.Joint("cart").generic([{}, {"locked": True}, {"locked": True}], [{"locked": True}] * 3)

@@ -50,8 +50,8 @@ def numbers(
     shape: tuple[int, ...],
     absent: Callable[[], NDArray[np.bool_]] | None = None,
 ) -> NDArray[np.float32]:
-    """Finite numbers in a new array of single precision. A length of -1 in the shape can be any length. `absent` tells
-    which numbers may be NaN, because a world has no such body or drive.
+    """Finite numbers in a new array of single precision. A length of -1 in the shape can be any length. Numbers of
+    absent bodies or drives (`absent`) may be NaN.
     """
     try:
         array = np.asarray(value)

@@ -146,9 +146,9 @@ def survey(
     call reuses the rows of the file, and discards an incomplete line.
 
     `engine`: "here" is this process, "processes" is a pool of `workers` processes (by default one for each processor),
-    and "ray" is a cluster (drystone[ray]). "auto" is "ray" if Ray is initialized, else "processes". A script that starts
-    processes needs `if __name__ == "__main__":` around its calls. `chunk` is the number of runs in a task; None aims at
-    a second for each task.
+    and "ray" is a cluster (drystone[ray]). "auto" is "ray" if Ray is initialized, else "processes". A script that
+    starts processes needs `if __name__ == "__main__":` around its calls. `chunk` is the number of runs in a task; None
+    aims at a second for each task.
 
     `twice` is the share of runs that another worker computes again. If the results differ, NotTheSame names the run and
     both machines. `timed` names results that a clock gives, which may differ. With `timing`, each machine computes one
@@ -157,8 +157,8 @@ def survey(
     `shard` (2, 4) computes the second of four equal parts of the runs, for machines without a cluster. `survey.merge`
     joins the files of all parts.
 
-    `on_error`: "row" makes a row with the `error` of an exception, and "raise" raises it. `progress` shows completed rows
-    and the remaining time; None shows them on a terminal. Ctrl-C keeps the completed rows.
+    `on_error`: "row" makes a row with the `error` of an exception, and "raise" raises it. `progress` shows completed
+    rows and the remaining time; None shows them on a terminal. Ctrl-C keeps the completed rows.
 
     ValueError: an argument is invalid. OSError: `out` cannot be read or written. RuntimeError: a run ended its worker
     three times. NotTheSame: two workers computed different results.
@@ -505,7 +505,7 @@ def _engine(name: str, workers: int | None, run: Run, timing: bool) -> _Engine:
 
 
 def _check_found(run: Run) -> None:
-    """Whether a new process finds a function."""
+    """Refuse a function that a new process cannot import."""
     try:
         pickle.dumps(run)
     except Exception as error:

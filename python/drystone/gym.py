@@ -36,9 +36,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
     """A batch as parallel environments.
 
     `observe(batch)` returns [W, ...], `reward(batch, actions)` [W], and `terminated(batch)` bool [W]. `act(batch,
-    actions)` writes inputs; None sets `ctrl` to the actions. `start(rng, batch, world)` changes a world after its reset. `memory` has the arrays that
-    these functions keep from step to step, so that `state` saves them. An action lasts `frame_skip` steps, and an
-    episode is truncated after `max_steps` actions.
+    actions)` writes inputs; None sets `ctrl` to the actions. `start(rng, batch, world)` changes a world after its
+    reset. `memory` has the arrays that these functions keep from step to step, so that `state` saves them. An action
+    lasts `frame_skip` steps, and an episode is truncated after `max_steps` actions.
 
     All three autoreset modes are supported. World k has the seed s + k, or the k-th seed of a list. Its n-th episode
     depends only on that seed and n, not on other worlds. A failed world is terminated, infos["error"] has the reason,

@@ -161,7 +161,8 @@ class Fleet:
         arguments: Callable[[_Share], tuple[tuple[Any, ...], dict[str, Any]]],
         changes: bool = False,
     ) -> list[Any]:
-        """Call all actors at the same time, and return their results. Worlds that fail have their numbers in the fleet."""
+        """Call all actors at the same time, and return their results. Worlds that fail have their numbers in the
+        fleet."""
         calls = [(name, *arguments(share)) for share in self._shares]
         running = [share.actor.do.remote(*call) for share, call in zip(self._shares, calls, strict=True)]
         results: list[Any] = []

@@ -45,7 +45,7 @@ def test_modules_are_found_without_an_import() -> None:
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert ran.stdout.split() == ["table", "Fleet"]
     assert ran.stderr.splitlines()[-1].startswith("AttributeError: module 'drystone' has no attribute 'raay'")
-    # An extra that is missing says what to install.
+    # The error of a missing extra names the package.
     code = "import sys; sys.modules['gymnasium'] = None; import drystone as ds; ds.gym"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert ran.stderr.splitlines()[-1] == "ImportError: Gymnasium is not installed: pip install 'drystone[gym]'"
