@@ -18,7 +18,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent import futures
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from multiprocessing import current_process, get_context
 from pathlib import Path
 from typing import Any, Protocol, TextIO, overload
@@ -279,7 +279,7 @@ def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
         source = inspect.getsource(run)
     except (OSError, TypeError):
         source = repr(run)
-    program = hashlib.sha256(Path(str(_drystone.__file__)).read_bytes()).hexdigest()
+    program = _program()
     seen: dict[str, int] = {}
     keys = []
     for one in asked:
@@ -287,6 +287,12 @@ def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
         count = seen[text] = seen.get(text, -1) + 1
         keys.append(hashlib.sha256(f"{text}{count or ''}".encode()).hexdigest()[:20])
     return keys
+
+
+@cache
+def _program() -> str:
+    """A hash of the program."""
+    return hashlib.sha256(Path(str(_drystone.__file__)).read_bytes()).hexdigest()
 
 
 def _machine() -> str:
