@@ -663,7 +663,7 @@ class _Ray:
 
     def _processors(self) -> list[float]:
         """Number of processors of each node."""
-        return [node["Resources"].get("CPU", 0.0) for node in self.ray.nodes() if node["Alive"]]
+        return [node.get("Resources", {}).get("CPU", 0.0) for node in self.ray.nodes() if node["Alive"]]
 
     def __exit__(self, *_: object) -> None:
         for reference in self.running:
