@@ -9,6 +9,9 @@
 True
 """
 
+import importlib
+from types import ModuleType
+
 from ._batch import Batch, Contacts, Hits, Snapshots, WorldError, wxyz
 from ._build import Body, Joint, World
 from ._drystone import AdapterError, InternalError
@@ -39,3 +42,12 @@ __all__ = [
     "survey",
     "wxyz",
 ]
+
+# Modules that need an extra, or that few programs use. They are imported when they are first named.
+_LAZY = ("gym", "ray", "rerun", "studies")
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name in _LAZY:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,7 +6,7 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Self, TypeVar
@@ -62,6 +62,8 @@ MEASURES = (
 )
 # Largest side of a picture (pixels).
 MAX_PIXELS = 8192
+# More threads than any machine has processors would only exhaust the system.
+MAX_THREADS = 1024
 LISTEN = ("contacts", "impulses", "hits")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
 
@@ -71,6 +73,15 @@ class WorldError(RuntimeError):
 
     `worlds` has their indices, and `messages` has one line for each. After `rollout`, `records` has the recorded
     values, and NaN for records that a world did not reach.
+
+    >>> import drystone as ds
+    >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 3)
+    >>> batch.force[1, 2] = (float("inf"), 0, 0)
+    >>> try:
+    ...     batch.step(10)
+    ... except ds.WorldError as error:
+    ...     print(error.worlds, batch.steps)
+    [1] [10  0 10]
     """
 
     def __init__(self, worlds: NDArray[np.int64], messages: list[str]) -> None:
@@ -114,9 +125,17 @@ class Snapshots:
         """Load states from the bytes of `Batch.save` or `to_bytes`.
 
         ValueError: the bytes are not a saved world, have another version, or are damaged or cut short.
+
+        >>> import drystone as ds
+        >>> saved = ds.Batch(ds.Scene.find("tower", n=3), 2).save()
+        >>> ds.Snapshots.from_bytes(saved)
+        <Snapshots of 2 worlds>
         """
-        if isinstance(states, (bytes, bytearray)):
-            raise ValueError("states is bytes: must be a list of bytes, one a world")
+        if isinstance(states, (str, bytes, bytearray)) or not isinstance(states, Sequence):
+            raise ValueError(f"states is {type(states).__name__}: must be a list of bytes, one for each world")
+        for k, one in enumerate(states):
+            if not isinstance(one, (bytes, bytearray)):
+                raise ValueError(f"states[{k}] is {type(one).__name__}: must be bytes")
         return cls([_drystone.State.load(bytes(one)) for one in states])
 
     def to_bytes(self) -> list[bytes]:
@@ -147,11 +166,14 @@ class Snapshots:
     def __iter__(self) -> Iterator[Snapshots]:
         return (Snapshots([state]) for state in self._states)
 
+    def __repr__(self) -> str:
+        return f"<Snapshots of {len(self)} worlds>"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return Snapshots.from_bytes, (self.to_bytes(),)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Contacts:
     """Contacts of some worlds. The contacts of one world are contiguous, sorted by pairs of bodies, and so are the
     points of one contact.
@@ -159,6 +181,15 @@ class Contacts:
     `world_start` [w + 1], `bodies` [N, 2], `normal` [N, 3] from the first body to the second, `impulse` [N, 3] on the
     second body over the whole step (N s), `point_start` [N + 1], `point` [P, 3] (m), `separation` [P] (m),
     `point_impulse` [P] (N s). Impulses are zero unless the batch listens to "impulses".
+
+    >>> import drystone as ds
+    >>> batch = ds.Batch(ds.Scene.find("tower", n=2), listen=["impulses"])
+    >>> batch.step(60)
+    >>> contacts = batch.contacts()
+    >>> contacts
+    <Contacts of 1 worlds: 2 contacts, 8 points>
+    >>> contacts.bodies.tolist(), contacts.normal[1].round(3).tolist(), contacts.point_start.tolist()
+    ([[0, 1], [1, 2]], [0.0, 1.0, 0.0], [0, 4, 8])
     """
 
     world_start: NDArray[np.uint32]
@@ -179,7 +210,7 @@ class Contacts:
         >>> batch.contacts().of(1).bodies.tolist()
         [[0, 1], [1, 2]]
         """
-        if not 0 <= k < len(self.world_start) - 1:
+        if not 0 <= _check.whole("k", k) < len(self.world_start) - 1:
             raise ValueError(f"k = {k}: must be 0 to {len(self.world_start) - 2}")
         first, end = (int(n) for n in self.world_start[k : k + 2])
         points = slice(*(int(n) for n in self.point_start[[first, end]]))
@@ -195,23 +226,36 @@ class Contacts:
             self.point_impulse[points],
         )
 
+    def __repr__(self) -> str:
+        return f"<Contacts of {len(self.world_start) - 1} worlds: {len(self.bodies)} contacts, {len(self.point)} points>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Hits:
     """First hits of rays: `body` [w, R] (-1 without a hit), `distance` [w, R] (m; infinite without a hit), and
     `normal` [w, R, 3] (NaN without a hit).
+
+    >>> import drystone as ds
+    >>> hits = ds.Batch(ds.Scene.find("tower", n=2)).ray([[0, 9, 0], [9, 9, 0]], [[0, -1, 0], [0, 1, 0]])
+    >>> hits.body.tolist(), hits.distance.tolist(), hits.normal[0, 0].tolist()
+    ([[2, -1]], [[7.0, inf]], [0.0, 1.0, 0.0])
     """
 
     body: NDArray[np.int64]
     distance: Floats
     normal: Floats
 
+    def __repr__(self) -> str:
+        worlds, rays = self.body.shape
+        return f"<Hits of {rays} rays in {worlds} worlds: {(self.body >= 0).sum()} hits>"
+
 
 class Batch:
     """W independent worlds with up to B bodies, J joints and U actuators.
 
     `scene` and `config` are one value for all worlds, or one for each world. `num_threads` 0 uses all processors.
-    `listen` selects the data that steps report: "contacts" and "hits" for `events`, "impulses" for `contacts`.
+    `listen` selects the data that steps report: "contacts" and "hits" for `events`, "impulses" for `contacts` and
+    `contact_impulse`. `hits_above` is the least speed of a reported hit (m/s).
 
     The bits of a world depend only on its scene, settings and inputs. They do not depend on W, the other worlds, the
     order of calls to others, threads or the machine. A call does not change worlds that it does not name. After a fork
@@ -257,12 +301,17 @@ class Batch:
             raise ValueError(f"{given}: must be one, or one for each world")
         count = counts.pop() if counts else 1
         is_one = len(scenes) == len(configs) == 1
-        threads = _check.whole("num_threads", num_threads)
+        threads = _threads(num_threads)
         of_scenes, of_configs = ([one._scene for one in scenes], [one._config for one in configs])
         if not is_one:
             of_scenes = of_scenes * (count if len(of_scenes) == 1 else 1)
             of_configs = of_configs * (count if len(of_configs) == 1 else 1)
-        self._begin(_drystone.Batch.of_scenes(of_scenes, of_configs, count, threads), listen, hits_above)
+        batch = _drystone.Batch.of_scenes(of_scenes, of_configs, count, threads)
+        words = _listen(batch, listen, hits_above)
+        if words:
+            # The start states must listen too, because a reset restores them.
+            batch = _drystone.Batch.of_states(batch.states(np.arange(count)), threads)
+        self._begin(batch, "impulses" in words, scenes * (count if len(scenes) == 1 else 1))
 
     @classmethod
     def load(
@@ -273,7 +322,8 @@ class Batch:
         listen: Collection[str] | None = None,
         hits_above: float = 0.5,
     ) -> Self:
-        """Load one world for each state of `save` or `snapshot`. A reset goes back to that state.
+        """Load one world for each state of `save` or `snapshot`. A reset goes back to that state. With `listen` None,
+        each world keeps the `listen` of its state.
 
         ValueError: there is no state, or the bytes are not a saved world, have another version, or are damaged or cut
         short.
@@ -288,19 +338,23 @@ class Batch:
         """
         own = cls.__new__(cls)
         snapshots = states if isinstance(states, Snapshots) else Snapshots.from_bytes(states)
-        made = _drystone.Batch.of_states(snapshots._states, _check.whole("num_threads", num_threads))
-        own._begin(made, listen, hits_above)
+        threads = _threads(num_threads)
+        batch = _drystone.Batch.of_states(snapshots._states, threads)
+        words = ["impulses"]
+        if listen is not None:
+            words = _listen(batch, listen, hits_above)
+            batch = _drystone.Batch.of_states(batch.states(np.arange(len(snapshots))), threads)
+        own._begin(batch, "impulses" in words, [])
         return own
 
-    def _begin(self, batch: _drystone.Batch, listen: Collection[str] | None, hits_above: float) -> None:
+    def _begin(self, batch: _drystone.Batch, has_impulses: bool, scenes: list[Scene]) -> None:
         self._batch = batch
         self._process = os.getpid()
+        # The scene of each world, unknown for a batch of states.
+        self._scenes = scenes
+        self._has_impulses = has_impulses
         self._lock = threading.RLock()
         self._worlds, self._bodies, self._joints, self._drives = batch.sizes()
-        if listen is not None:
-            words = [_check.one_of("listen", word, LISTEN) for word in ([listen] if isinstance(listen, str) else listen)]
-            above = _check.number("hits_above", hits_above) if "hits" in words else None
-            batch.listen("contacts" in words, "impulses" in words, above)
         self._arrays = {name: np.full(self._shape(name), np.nan, np.float32) for name in (*VIEWS, *INPUTS)}
         self._views = {name: _read_only(self._arrays[name]) for name in VIEWS}
         self._inputs = [(name, self._arrays[name]) for name in INPUTS]
@@ -406,7 +460,15 @@ class Batch:
 
     @property
     def ctrl(self) -> Floats:
-        """[W, U] speed of each motor (m/s, rad/s) and target of each spring (m, rad); an input."""
+        """[W, U] speed of each motor (m/s, rad/s) and target of each spring (m, rad); an input. `Scene.actuators` has
+        the names.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("drawbridge"), 2)
+        >>> batch.ctrl[1] = 0.3
+        >>> batch.ctrl.shape, batch.ctrl[1].round(2).tolist()
+        ((2, 2), [0.30000001192092896, 0.30000001192092896])
+        """
         return self._arrays["ctrl"]
 
     @ctrl.setter
@@ -424,7 +486,7 @@ class Batch:
 
     def _set_input(self, name: str, value: ArrayLike) -> None:
         array = self._arrays[name]
-        array[...] = _check.numbers(name, value, array.shape)
+        array[...] = _check.numbers(name, value, array.shape, lambda: np.isnan(self._column(name)))
 
     @property
     def exists(self) -> NDArray[np.bool_]:
@@ -438,7 +500,12 @@ class Batch:
 
     @property
     def substeps(self) -> NDArray[np.uint32]:
-        """[W, B] substeps that a body takes in a step, 0 without a body; a new array."""
+        """[W, B] substeps that a body takes in a step, 0 without a body; a new array.
+
+        >>> import drystone as ds
+        >>> ds.Batch(ds.Scene.find("tower", n=2), config=ds.Config(substeps=5)).substeps.tolist()
+        [[5, 5, 5]]
+        """
         return self._body_flags()[2]
 
     def _body_flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.uint32]]:
@@ -464,7 +531,17 @@ class Batch:
 
     @property
     def joint_position(self) -> Floats:
-        """[W, J, 6] three lengths (m) and three angles (rad) of each joint; a new array."""
+        """[W, J, 6] three lengths (m) and three angles (rad) of each joint; a new array.
+
+        >>> import drystone as ds
+        >>> world = ds.World()
+        >>> bob = world.add(ds.Body.dynamic("bob").ball(0.1).at(1, 0, 0))
+        >>> world.join(ds.Joint(bob).hinge((0, 0, 1)).at(0, 0, 0))
+        >>> batch = ds.Batch(ds.Scene.from_world(world))
+        >>> batch.step(20)
+        >>> batch.joint_position.shape, int((abs(batch.joint_position) > 0.1).sum())
+        ((1, 1, 6), 1)
+        """
         return self._column("joint_position")
 
     @property
@@ -494,6 +571,37 @@ class Batch:
         """[W, J, 3] angular impulse on the second body in the last substep (N m s); a new array."""
         return self._column("joint_torque_impulse")
 
+    @property
+    def contact_impulse(self) -> Floats:
+        """[W, B, 3] sum of the impulses of all contacts on each body over the last step (N s); a new array. Its shape
+        is fixed, for observations of policies. `contacts` has the single contacts.
+
+        Impulses are zero in a world whose restored state does not listen to them.
+
+        ValueError: the batch does not listen to "impulses".
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 1, listen=["impulses"])
+        >>> batch.step(60)
+        >>> [round(60 * float(force)) for force in batch.contact_impulse[0, :, 1]]
+        [-19620, 9810, 9810]
+        """
+        if not self._has_impulses:
+            raise ValueError("contact_impulse: the batch does not listen to 'impulses'")
+        contacts, exists = self.contacts(), self.exists
+        of_world = np.repeat(np.arange(self._worlds), np.diff(contacts.world_start))
+        rows = of_world[:, None] * self._bodies + contacts.bodies
+        total = np.empty((self._worlds * self._bodies, 3))
+        for axis in range(3):
+            # Sums in the order of the contacts, which is the same on every machine.
+            on_first, on_second = (
+                np.bincount(rows[:, k], contacts.impulse[:, axis], len(total)) for k in range(2)
+            )
+            total[:, axis] = on_second - on_first
+        impulse = total.reshape(self._worlds, self._bodies, 3).astype(np.float32)
+        impulse[~exists] = np.nan
+        return impulse
+
     def _column(self, name: str) -> Floats:
         array = np.full(self._shape(name), np.nan, np.float32)
         self._alone(lambda: self._batch.read(np.arange(self._worlds), [(name, array)]))
@@ -503,8 +611,8 @@ class Batch:
         """Advance worlds by n steps of `dt` seconds; None is the step length of the scene. `worlds` is a mask [W] or
         ascending indices; None selects all.
 
-        WorldError: some worlds failed; all others completed the call. KeyboardInterrupt ends the call with every world
-        between two steps.
+        ValueError: an argument is invalid. WorldError: some worlds failed; all others completed the call.
+        KeyboardInterrupt: Ctrl-C ended the call; every world is between two steps.
 
         >>> import drystone as ds, numpy as np
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 3)
@@ -512,7 +620,10 @@ class Batch:
         >>> batch.steps.tolist()
         [3, 0, 3]
         """
-        self._run(n, 1, worlds, dt, None, {})
+        n = _check.whole("n", n)
+        chosen = _check.worlds(worlds, self._worlds)
+        length = None if dt is None else _step_length(dt)
+        _raise_failed(self._alone(lambda: self._run_alone(n, 1, chosen, length, None, {})), {})
 
     def rollout(
         self,
@@ -523,25 +634,68 @@ class Batch:
         record: Collection[str] = ("position",),
         worlds: ArrayLike | None = None,
         dt: float | None = None,
+        out: Mapping[str, NDArray[Any]] | None = None,
+        until: Callable[[Batch], ArrayLike] | None = None,
     ) -> dict[str, NDArray[Any]]:
         """Advance w worlds by n steps in one call, and record every `every`-th step: arrays [w, n // every, ...].
 
-        `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...),
-        measures (`measure`) and "hash". A WorldError has the records so far.
+        `ctrl` [w or 1, n or 1, U] is set before each step. `record` names columns ("position", "joint_speed", ...) in
+        single precision, measures (`measure`) in double precision, and "hash" (uint64). `out` has arrays by name. The
+        call fills and returns them in place of new ones.
+
+        `until(batch)` returns a bool for each world, [W]. The call asks it after every `every` steps, and a world stops
+        when its value is True. Its later records are NaN (0 for "hash"). `steps` has the number of steps of each world.
+
+        ValueError: an argument is invalid. WorldError: some worlds failed; the error has the records so far.
+        KeyboardInterrupt: Ctrl-C ended the call; every world is between two steps.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 2)
         >>> out = batch.rollout(30, every=10, record=("position", "kinetic_energy", "hash"))
         >>> out["position"].shape, out["hash"].shape, bool(out["hash"][0, 2] == batch.hash()[0])
         ((2, 3, 4, 3), (2, 3), True)
+        >>> batch.force[1, 3] = (9000, 0, 0)
+        >>> _ = batch.rollout(600, every=10, until=lambda batch: batch.position[:, 3, 1] < 2)
+        >>> bool(batch.steps[0] == 630), bool(batch.steps[1] < 630)
+        (True, True)
         """
         n, every = _check.whole("n", n), _check.whole("every", every, 1)
         chosen = _check.worlds(worlds, self._worlds)
+        length = None if dt is None else _step_length(dt)
         numbers = None if ctrl is None else self._controls(ctrl, len(chosen), n)
-        names = [record] if isinstance(record, str) else list(record)
-        records = {name: self._record(name, len(chosen), n // every) for name in names}
-        self._run(n, every, chosen, dt, numbers, records)
+        if until is not None and not callable(until):
+            raise ValueError(f"until is {type(until).__name__}: must be a function of a batch")
+        names = _check.words("record", record, [*COLUMNS, *MEASURES, "hash"])
+        given = self._given(names, out, len(chosen), n // every)
+        records = {name: given.get(name, self._record(name, len(chosen), n // every)) for name in names}
+        if until is None:
+            failed = self._alone(lambda: self._run_alone(n, every, chosen, length, numbers, records))
+        else:
+            failed = self._alone(lambda: self._run_until(n, every, chosen, length, numbers, records, until))
+        _raise_failed(failed, records)
         return records
+
+    def _given(
+        self, names: list[str], out: Mapping[str, NDArray[Any]] | None, worlds: int, rows: int
+    ) -> dict[str, NDArray[Any]]:
+        """The arrays of `out`, checked and without values."""
+        if out is None:
+            return {}
+        if not isinstance(out, Mapping):
+            raise ValueError(f"out is {type(out).__name__}: must be a dict of arrays")
+        used = dict(self._arrays)
+        for name, array in out.items():
+            label = f"out[{name!r}]"
+            _check.one_of("out", name, names)
+            wanted = self._record(name, 0, rows)
+            _check.output(label, array, (worlds, *wanted.shape[1:]), wanted.dtype)
+            for other, of in used.items():
+                if np.may_share_memory(array, of):
+                    raise ValueError(f"{label} shares memory with {other}: must have memory of its own")
+            used[label] = array
+        for name, array in out.items():
+            array.fill(0 if name == "hash" else np.nan)
+        return dict(out)
 
     def _controls(self, ctrl: ArrayLike, worlds: int, steps: int) -> Floats:
         array = np.asarray(ctrl)
@@ -552,30 +706,11 @@ class Batch:
         return np.ascontiguousarray(np.broadcast_to(numbers, (worlds, *array.shape[1:])))
 
     def _record(self, name: str, worlds: int, rows: int) -> NDArray[Any]:
-        _check.one_of("record", name, [*COLUMNS, *MEASURES, "hash"])
         if name == "hash":
             return np.zeros((worlds, rows), np.uint64)
         if name in MEASURES:
             return np.full((worlds, rows), np.nan)
         return np.full((worlds, rows, *self._shape(name)[1:]), np.nan, np.float32)
-
-    def _run(
-        self,
-        n: int,
-        every: int,
-        worlds: ArrayLike | None,
-        dt: float | None,
-        ctrl: Floats | None,
-        records: dict[str, NDArray[Any]],
-    ) -> None:
-        n = _check.whole("n", n)
-        chosen = _check.worlds(worlds, self._worlds)
-        length = None if dt is None else _step_length(dt)
-        failed = self._alone(lambda: self._run_alone(n, every, chosen, length, ctrl, records))
-        if failed:
-            error = WorldError(np.array([world for world, _ in failed]), [line for _, line in failed])
-            error.records = records
-            raise error
 
     def _run_alone(
         self,
@@ -599,6 +734,38 @@ class Batch:
                 self._batch.read(chosen, [("ctrl", self._arrays["ctrl"])])
         return failed
 
+    def _run_until(
+        self,
+        n: int,
+        every: int,
+        chosen: NDArray[np.int64],
+        dt: float | None,
+        ctrl: Floats | None,
+        records: dict[str, NDArray[Any]],
+        until: Callable[[Batch], ArrayLike],
+    ) -> list[tuple[int, str]]:
+        failed: list[tuple[int, str]] = []
+        # Rows of the worlds that still run.
+        rows = np.arange(len(chosen))
+        for first in range(0, n, every):
+            if not len(rows):
+                break
+            count = min(every, n - first)
+            steps = slice(0, 1) if ctrl is None or ctrl.shape[1] == 1 else slice(first, first + count)
+            own = None if ctrl is None else np.ascontiguousarray(ctrl[rows, steps])
+            parts = {name: self._record(name, len(rows), 1) for name in records} if count == every else {}
+            failed_now = self._run_alone(count, every, chosen[rows], dt, own, parts)
+            for name, part in parts.items():
+                records[name][rows, first // every] = part[:, 0]
+            is_over = np.asarray(until(self))
+            if is_over.shape != (self._worlds,) or is_over.dtype != bool:
+                given = f"shape {is_over.shape} and dtype {is_over.dtype}"
+                raise ValueError(f"until gives {given}: must be ({self._worlds},) bools")
+            is_over = is_over | np.isin(np.arange(self._worlds), [world for world, _ in failed_now])
+            rows = rows[~is_over[chosen[rows]]]
+            failed += failed_now
+        return sorted(failed)
+
     def apply_impulse(
         self,
         impulse: ArrayLike,
@@ -609,6 +776,8 @@ class Batch:
     ) -> None:
         """Apply impulses [w, b, 3] (N s) at once to some bodies of some worlds, through centers of mass or at points
         `at` [w, b, 3] (m).
+
+        ValueError: an argument is invalid.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -621,7 +790,9 @@ class Batch:
         shape = (len(chosen), len(columns), 3)
         all_impulses = np.zeros((len(chosen), self._bodies, 3), np.float32)
         all_points = np.full_like(all_impulses, np.nan)
-        all_impulses[:, columns] = _check.numbers("impulse", impulse, shape)
+        given = _check.numbers("impulse", impulse, shape, lambda: ~self.exists[np.ix_(chosen, columns)][..., None])
+        # Rows of absent bodies can be NaN.
+        all_impulses[:, columns] = np.nan_to_num(given)
         if at is not None:
             all_points[:, columns] = _check.numbers("at", at, shape)
         self._alone(lambda: self._batch.apply_impulse(chosen, all_impulses, all_points))
@@ -639,7 +810,10 @@ class Batch:
     ) -> None:
         """Set poses and velocities [w, b, 3 or 4] of some bodies of some worlds.
 
-        Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`.
+        Contacts that still touch keep their impulses. To start anew, use `reset` or `restore`. Rows of bodies that a
+        world does not have may be NaN, as in the arrays of the batch.
+
+        ValueError: an argument is invalid, or a rotation has no unit length.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -667,7 +841,8 @@ class Batch:
         """Set coefficients [w, b] of some bodies of some worlds, and the factor on their initial mass and moments of
         inertia. A reset sets the values of the scene. Bodies without mass stay without mass.
 
-        ValueError: a shape is wrong, or a mass is not 1e-15 to 1e15 kg.
+        ValueError: a shape is wrong, a friction is below 0, a restitution is not 0 to 1, or a mass is not 1e-15 to 1e15
+        kg.
 
         >>> import drystone as ds
         >>> batch = ds.Batch(ds.Scene.find("tower", n=2), 2)
@@ -686,12 +861,13 @@ class Batch:
         checked: dict[str, Floats] = {}
         for name, value in values.items():
             if value is not None:
-                width = COLUMNS[name]
-                shape = (len(chosen), len(columns)) if width == 1 else (len(chosen), len(columns), width)
-                checked[name] = _check.numbers(name, value, shape).reshape(len(chosen), len(columns), width)
-        for name, numbers in checked.items():
-            whole = self._column(name)[chosen].reshape(len(chosen), self._bodies, COLUMNS[name])
-            whole[:, columns] = numbers
+                whole = self._column(name)[chosen]
+                shape = whole[:, columns].shape
+                numbers = _check.numbers(name, value, shape, partial(np.isnan, whole[:, columns]))
+                _check_range(name, numbers)
+                whole[:, columns] = numbers
+                checked[name] = whole.reshape(len(chosen), self._bodies, COLUMNS[name])
+        for name, whole in checked.items():
             self._alone(partial(self._batch.write, chosen, name, whole))
         self._alone(lambda: self._take(chosen))
 
@@ -731,8 +907,16 @@ class Batch:
         self, snapshots: Snapshots, worlds: ArrayLike | None = None, *, source: ArrayLike | None = None
     ) -> None:
         """Continue worlds from states: one state for each world, one for all, or the indices of states in `source` [w].
+        A state includes the `listen` of its batch.
 
         ValueError: the number of states is wrong, or a state has more bodies, joints or drives than the batch has rows.
+
+        >>> import drystone as ds
+        >>> batch = ds.Batch(ds.Scene.find("pile", n=8), 4)
+        >>> batch.step(9, worlds=[0])
+        >>> batch.restore(batch.snapshot([0, 1]), worlds=[1, 2, 3], source=[0, 1, 0])
+        >>> batch.steps.tolist()
+        [9, 9, 0, 9]
         """
         if not isinstance(snapshots, Snapshots):
             raise ValueError(f"snapshots is {type(snapshots).__name__}: must be Snapshots; Snapshots.from_bytes makes them of bytes")
@@ -746,6 +930,8 @@ class Batch:
 
         def restore() -> None:
             self._batch.restore(chosen, states)
+            # The states may listen to impulses.
+            self._has_impulses = True
             self._take(chosen, inputs=True)
 
         self._alone(restore)
@@ -837,7 +1023,10 @@ class Batch:
     def ray(
         self, origin: ArrayLike, direction: ArrayLike, max_distance: float = 1e6, *, worlds: ArrayLike | None = None
     ) -> Hits:
-        """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m).
+        """First hits of R rays in each of w worlds. `origin` and `direction` are [R, 3] or [w, R, 3] (m). A direction
+        can have any length but zero, and a distance is in meters.
+
+        ValueError: an argument is invalid.
 
         >>> import drystone as ds
         >>> hits = ds.Batch(ds.Scene.find("tower", n=2), 2).ray([[0, 9, 0]], [[0, -1, 0]])
@@ -849,6 +1038,8 @@ class Batch:
         if rays[0].shape != rays[1].shape:
             raise ValueError(f"origin has shape {rays[0].shape} and direction {rays[1].shape}: must be the same")
         most, shape = _check.number("max_distance", max_distance), rays[0].shape
+        if most < 0:
+            raise ValueError(f"max_distance = {most}: must be 0 or more")
         body = np.full(shape[:2], -1, np.int64)
         distance, normal = np.full(shape[:2], np.inf, np.float32), np.full(shape, np.nan, np.float32)
         self._alone(lambda: self._batch.ray(chosen, rays[0], rays[1], most, body, distance, normal))
@@ -882,10 +1073,11 @@ class Batch:
 
     @staticmethod
     def _rays(name: str, value: ArrayLike, worlds: int) -> Floats:
-        if np.ndim(value) == 2:
-            rays = _check.numbers(name, value, (-1, 3))
-            return np.ascontiguousarray(np.broadcast_to(rays, (worlds, *rays.shape)))
-        return _check.numbers(name, value, (worlds, -1, 3))
+        is_flat = np.ndim(value) == 2
+        rays = _check.numbers(name, value, (-1, 3) if is_flat else (worlds, -1, 3))
+        if name == "direction":
+            _check.rows_within(name, rays, np.asarray(rays.any(axis=-1)), "have a length")
+        return np.ascontiguousarray(np.broadcast_to(rays, (worlds, *rays.shape))) if is_flat else rays
 
     def __len__(self) -> int:
         return self._worlds
@@ -895,6 +1087,21 @@ class Batch:
 
     def __reduce__(self) -> tuple[Any, ...]:
         raise TypeError("a Batch is not pickled: send batch.save(), and load it by Batch.load")
+
+
+def _listen(batch: _drystone.Batch, listen: Collection[str], hits_above: float) -> list[str]:
+    """Select the data that steps report. Returns the words of `listen`."""
+    words = _check.words("listen", listen, LISTEN)
+    above = _check.number("hits_above", hits_above) if "hits" in words else None
+    batch.listen("contacts" in words, "impulses" in words, above)
+    return words
+
+
+def _raise_failed(failed: list[tuple[int, str]], records: dict[str, NDArray[Any]]) -> None:
+    if failed:
+        error = WorldError(np.array([world for world, _ in failed]), [line for _, line in failed])
+        error.records = records
+        raise error
 
 
 def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:
@@ -908,6 +1115,23 @@ def _one_or_many(name: str, value: Any, kind: type[Any]) -> list[Any]:
     if not values:
         raise ValueError(f"{name} is empty: must have at least one {kind.__name__}")
     return list(values)
+
+
+def _check_range(name: str, rows: Floats) -> None:
+    """The ranges of columns that `set_state` and `set_material` write. Rows that no body has are NaN."""
+    if name == "rotation":
+        _check.rows_within(name, rows, ~(abs(np.linalg.norm(rows, axis=-1) - 1) > 1e-3), "have unit length")
+    elif name == "friction":
+        _check.rows_within(name, rows, ~(rows < 0), "be 0 or more")
+    elif name == "restitution":
+        _check.rows_within(name, rows, ~((rows < 0) | (rows > 1)), "be 0 to 1")
+
+
+def _threads(count: Any) -> int:
+    threads = _check.whole("num_threads", count)
+    if threads > MAX_THREADS:
+        raise ValueError(f"num_threads = {threads}: must be at most {MAX_THREADS}")
+    return threads
 
 
 def _side(name: str, pixels: Any) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
 import math
 import os
@@ -15,7 +16,7 @@ import numpy as np
 
 from . import _check, _drystone
 from ._scene import Config
-from ._survey import Row, Rows, plain, survey
+from ._survey import Row, Rows, merge, plain, survey
 from .studies import color_of, text
 
 Settings = Mapping[str, Any]
@@ -60,6 +61,7 @@ def families(
     workers: int | None = None,
     chunk: int | None = None,
     twice: float = 0.01,
+    timing: bool = False,
     on_error: str = "row",
     progress: bool | None = None,
 ) -> Stability:
@@ -79,8 +81,7 @@ def families(
     """
     chosen = _grid(settings)
     known = [name for name, _ in _drystone.family_names()]
-    names = known if family is None else [family] if isinstance(family, str) else list(family)
-    names = [_check.one_of("family", name, known) for name in names]
+    names = known if family is None else _check.words("family", family, known)
     numbers = _seeds(seeds)
     if not names:
         raise ValueError("family is empty: must have at least one name, or be None for all")
@@ -96,6 +97,7 @@ def families(
         chunk=chunk,
         twice=twice,
         timed=TIMED,
+        timing=timing,
         on_error=on_error,
         progress=progress,
     )
@@ -159,7 +161,7 @@ def _label(settings: Settings) -> str:
     return ", ".join([str(settings.get("preset", "balanced")), *words])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stability:
     """The result of `drystone.survey.families`: the worlds that pass under each setting, and their price.
 
@@ -186,6 +188,10 @@ class Stability:
     def families(self) -> tuple[str, ...]:
         """The families in order."""
         return tuple(dict.fromkeys(row["family"] for row in self.rows))
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.rows)} worlds of {len(self.families)} families under {len(self.settings)} settings"
+        return f"<Stability: {sizes}>"
 
     def shares(self, *, together: bool = False) -> list[Row]:
         """The passing share of each family under each setting, or with `together` of all families in total.
@@ -311,8 +317,7 @@ class Stability:
         >>> found.map_svg().count("<rect")
         1
         """
-        names = self.families if family is None else [family] if isinstance(family, str) else list(family)
-        names = [_check.one_of("family", name, self.families) for name in names]
+        names = list(self.families) if family is None else _check.words("family", family, self.families)
         cells: dict[tuple[str, int, int], list[bool]] = {}
         for row in self.rows:
             if row["family"] in names and "error" not in row:
@@ -341,6 +346,12 @@ class Stability:
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the table (families.md) and both pictures (families-price.svg, families-map.svg) into a folder, and
         return their paths.
+
+        >>> import drystone as ds, tempfile
+        >>> found = ds.survey.families([{"preset": "fast"}], family="slopes", seeds=2, engine="here")
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     print([path.name for path in found.write(folder)])
+        ['families.md', 'families-price.svg', 'families-map.svg']
         """
         files = {"families.md": self.table() + "\n", "families-price.svg": self.price_svg(), "families-map.svg": self.map_svg()}
         made = Path(folder)
@@ -351,11 +362,16 @@ class Stability:
 
 
 class _Surveys:
-    """`drystone.survey`, with `families` as an attribute."""
+    """`drystone.survey`, with `families` and `merge` as attributes."""
 
     __call__ = staticmethod(survey)
     families = staticmethod(families)
+    merge = staticmethod(merge)
     __doc__ = survey.__doc__
+    __signature__ = inspect.signature(survey)
+
+    def __repr__(self) -> str:
+        return "<function drystone.survey>"
 
 
 survey_with_families = _Surveys()

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from . import _check, _drystone
-
-if TYPE_CHECKING:
-    from ._build import World
+from ._build import World
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a scene: its default, its smallest and largest value, and whether it is a whole number."""
+    """A parameter of a scene: its default, its smallest and largest value, and whether it is a whole number.
+
+    >>> import drystone as ds
+    >>> tower = next(scene for scene in ds.scenes() if scene.name == "tower")
+    >>> tower.parameters[0].name, tower.parameters[0].whole
+    ('n', True)
+    """
 
     name: str
     default: float
@@ -28,7 +35,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """A scene of the catalogue."""
+    """A scene of the catalogue.
+
+    >>> import drystone as ds
+    >>> ds.scenes()[0].name in [scene.name for scene in ds.scenes()]
+    True
+    """
 
     name: str
     summary: str
@@ -72,6 +84,7 @@ class Scene:
         Traceback (most recent call last):
         ValueError: "towr" is neither a scene nor a scene file; did you mean "tower"? `drystone scenes` lists the scenes
         """
+        _check.kind_of("name", name, str)
         words = [f"{key}={_plain(key, value)}" for key, value in parameters.items()]
         return cls(_drystone.Scene.find(name, words), (cls.find, name, parameters))
 
@@ -88,7 +101,7 @@ class Scene:
         ...     len(ds.Scene.load(path).bodies)
         3
         """
-        return cls(_drystone.Scene.load(os.fspath(path)), ())
+        return cls(_drystone.Scene.load(_check.path("path", path)), ())
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], name: str = "scene") -> Scene:
@@ -101,11 +114,17 @@ class Scene:
         >>> ds.Scene.from_dict({"version": 1, "bodies": [ball]}).bodies
         ('body 0',)
         """
+        if not isinstance(data, Mapping):
+            raise ValueError(f"data is {type(data).__name__}: must be a dict")
         try:
-            text = json.dumps(data)
+            text = json.dumps(dict(data))
         except (TypeError, ValueError) as error:
             raise ValueError(f"data: {error}") from None
-        return cls(_drystone.Scene.from_text(text, name), ())
+        try:
+            return cls(_drystone.Scene.from_text(text, _check.kind_of("name", name, str)), ())
+        except ValueError as error:
+            # Remove the place in the text: the caller never saw the text.
+            raise ValueError(re.sub(r" at line \d+ column \d+", "", str(error))) from None
 
     @classmethod
     def from_world(cls, world: World, dt: float = 1 / 60, name: str = "scene") -> Scene:
@@ -120,7 +139,8 @@ class Scene:
         >>> ds.Scene.from_world(world, dt=1 / 120).bodies
         ('box',)
         """
-        return cls.from_dict({**world.to_dict(), "dt": _check.number("dt", dt)}, name)
+        data = _check.kind_of("world", world, World).to_dict()
+        return cls.from_dict({**data, "dt": _check.number("dt", dt)}, name)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of a scene file for this scene, with every number to the last bit.
@@ -193,19 +213,24 @@ class Config:
     __slots__ = ("_config", "_settings")
 
     def __init__(self, preset: str = "balanced", *, sleep: bool = True, **settings: Any) -> None:
-        known: dict[str, Any] = json.loads(_drystone.Config.preset(preset).to_text())
-        if not sleep:
+        found: dict[str, Any] = json.loads(_drystone.Config.preset(_check.kind_of("preset", preset, str)).to_text())
+        known = dict(found)
+        if not _like("sleep", sleep, True):
             settings = {"sleep_after": 0.0, **settings}
         for key, value in settings.items():
             if key not in known:
                 raise ValueError(f"{key}: {_check.hint(key, known)}")
-            known[key] = {**known[key], **value} if isinstance(known[key], dict) else _json(key, value)
-        self._config = _drystone.Config.from_text(json.dumps(known))
+            known[key] = _like(key, value, known[key])
+        try:
+            self._config = _drystone.Config.from_text(json.dumps(known))
+        except ValueError as error:
+            raise ValueError(_named(str(error), found, {key: known[key] for key in settings})) from None
         self._settings: dict[str, Any] = known
 
     def __getitem__(self, key: str) -> Any:
-        if key not in self._settings:
-            raise KeyError(f"{key}: {_check.hint(key, self._settings)}")
+        """The value of a setting. KeyError: there is no setting of that name."""
+        if not isinstance(key, str) or key not in self._settings:
+            raise KeyError(f"{key}: {_check.hint(str(key), self._settings)}")
         return self._settings[key]
 
     def to_dict(self) -> dict[str, Any]:
@@ -229,8 +254,32 @@ def _config_of(settings: dict[str, Any]) -> Config:
     return Config(**settings)
 
 
-def _json(key: str, value: Any) -> Any:
-    """A value for JSON."""
-    if isinstance(value, (bool, int, str)):
+def _like(key: str, value: Any, known: Any) -> Any:
+    """A value for a setting, of the type of its known value."""
+    if isinstance(known, dict):
+        if not isinstance(value, Mapping):
+            raise ValueError(f"{key} = {value!r}: must be a dict")
+        for name in value:
+            if name not in known:
+                raise ValueError(f"{key}: {name}: {_check.hint(str(name), known)}")
+        return {**known, **{name: _like(name, one, known[name]) for name, one in value.items()}}
+    if isinstance(known, bool):
+        if not isinstance(value, (bool, np.bool_)):
+            raise ValueError(f"{key} = {value!r}: must be True or False")
+        return bool(value)
+    if isinstance(known, str):
+        if not isinstance(value, str):
+            raise ValueError(f"{key} = {value!r}: must be a word")
         return value
-    return _check.number(key, value)
+    return _check.whole(key, value) if isinstance(known, int) else _check.number(key, value)
+
+
+def _named(text: str, found: dict[str, Any], changed: dict[str, Any]) -> str:
+    """An error of some settings, with the name of the one that has this error alone."""
+    for key, value in changed.items():
+        try:
+            _drystone.Config.from_text(json.dumps({**found, key: value}))
+        except ValueError as error:
+            if str(error) == text and key not in text:
+                return f"{key}: {text}"
+    return text

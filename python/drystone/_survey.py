@@ -8,6 +8,7 @@ import importlib
 import inspect
 import json
 import os
+import pickle
 import platform
 import signal
 import sys
@@ -17,8 +18,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent import futures
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from functools import partial
-from multiprocessing import get_context
+from functools import cache, partial
+from multiprocessing import current_process, get_context
 from pathlib import Path
 from typing import Any, Protocol, TextIO, overload
 
@@ -40,6 +41,9 @@ SECONDS_A_TASK = 0.005
 TASKS_A_WORKER = 2
 # Number of times that a run may end its worker.
 MAX_DEATHS = 3
+NO_GUARD = (
+    "a new process ran the survey of its script again: put the calls of the script under `if __name__ == \"__main__\":`"
+)
 # Number of attempts of a check to find a worker other than that of the first run.
 MAX_SEARCHES = 5
 
@@ -47,23 +51,39 @@ MAX_SEARCHES = 5
 class NotTheSame(RuntimeError):
     """Two computations of one run gave different results. `run` has its argument, `results` both results, and
     `machines` where they were computed.
+
+    >>> import drystone as ds, itertools
+    >>> counter = itertools.count()
+    >>> try:
+    ...     ds.survey(lambda run: {"n": next(counter)}, [{"k": 1}], engine="here", twice=1)
+    ... except ds.NotTheSame as error:
+    ...     print(error.run, error.results)
+    {'k': 1} ({'n': 0}, {'n': 1})
     """
 
     def __init__(self, run: Any, results: tuple[Any, Any], machines: tuple[str, str]) -> None:
         self.run, self.results, self.machines = run, results, machines
         super().__init__(f"run {json.dumps(run)} gave {results[0]} on {machines[0]} and {results[1]} on {machines[1]}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return NotTheSame, (self.run, self.results, self.machines)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Rows(Sequence[Row]):
     """The rows of a survey in the order of its runs. A row has `key`, the argument, and the result or `error`.
 
     `who` has the machine and process that computed each row, and the time (s). It is empty for rows from an earlier
     file.
+
+    >>> import drystone as ds
+    >>> rows = ds.survey(lambda run: {"square": run["n"] ** 2}, [{"n": 2}, {"n": 3}], engine="here")
+    >>> rows, rows[1]["square"], [row["n"] for row in rows]
+    (<Rows: 2 rows of 3 columns>, 9, [2, 3])
     """
 
     rows: tuple[Row, ...]
-    who: tuple[Row, ...] = field(repr=False, default=())
+    who: tuple[Row, ...] = ()
 
     @overload
     def __getitem__(self, index: int) -> Row: ...
@@ -82,8 +102,24 @@ class Rows(Sequence[Row]):
         >>> ds.Rows(({"key": "a", "n": 1}, {"key": "b", "n": 2})).columns()["n"].tolist()
         [1, 2]
         """
-        names = dict.fromkeys(name for row in self.rows for name in row)
-        return {name: np.array([row.get(name) for row in self.rows]) for name in names}
+        return {name: _column([row.get(name) for row in self.rows]) for name in self._names()}
+
+    def _names(self) -> dict[str, None]:
+        return dict.fromkeys(name for row in self.rows for name in row)
+
+    def __repr__(self) -> str:
+        return f"<Rows: {len(self)} rows of {len(self._names())} columns>"
+
+
+def _column(values: list[Any]) -> np.ndarray[Any, Any]:
+    try:
+        return np.array(values)
+    except ValueError:
+        # Lists of several lengths, or lists and None.
+        column = np.empty(len(values), object)
+        for k, value in enumerate(values):
+            column[k] = value
+        return column
 
 
 def survey(
@@ -96,6 +132,8 @@ def survey(
     chunk: int | None = None,
     twice: float = 0.01,
     timed: Collection[str] = (),
+    timing: bool = False,
+    shard: tuple[int, int] | None = None,
     on_error: str = "row",
     progress: bool | None = None,
 ) -> Rows:
@@ -107,17 +145,23 @@ def survey(
     `out` is a file of JSON lines. Each row is added when it is computed, and the rows are sorted at the end. A repeated
     call reuses the rows of the file, and discards an incomplete line.
 
-    `engine`: "here" is this process, "processes" is a pool of processes, and "ray" is a cluster (drystone[ray]). "auto"
-    is "ray" if Ray is initialized, else "processes". `chunk` is the number of runs in a task; None aims at a second for
-    each task.
+    `engine`: "here" is this process, "processes" is a pool of `workers` processes (by default one for each processor),
+    and "ray" is a cluster (drystone[ray]). "auto" is "ray" if Ray is initialized, else "processes". A script that
+    starts processes needs `if __name__ == "__main__":` around its calls. `chunk` is the number of runs in a task; None
+    aims at a second for each task.
 
     `twice` is the share of runs that another worker computes again. If the results differ, NotTheSame names the run and
-    both machines. `timed` names results that a clock gives, which may differ.
+    both machines. `timed` names results that a clock gives, which may differ. With `timing`, each machine computes one
+    run at a time; on a cluster, machines with less than half of the processors of the largest one take no part.
 
-    `on_error`: "row" makes a row with the `error` of an exception, and "raise" raises it. Ctrl-C keeps the completed
-    rows.
+    `shard` (2, 4) computes the second of four equal parts of the runs, for machines without a cluster. `survey.merge`
+    joins the files of all parts.
 
-    ValueError: an argument is invalid. RuntimeError: a run ended its worker three times.
+    `on_error`: "row" makes a row with the `error` of an exception, and "raise" raises it. `progress` shows completed
+    rows and the remaining time; None shows them on a terminal. Ctrl-C keeps the completed rows.
+
+    ValueError: an argument is invalid. OSError: `out` cannot be read or written. RuntimeError: a run ended its worker
+    three times. NotTheSame: two workers computed different results.
 
     >>> import drystone as ds
     >>> from drystone.studies import stands
@@ -130,23 +174,101 @@ def survey(
     share = _check.number("twice", twice)
     if not 0 <= share <= 1:
         raise ValueError(f"twice = {twice}: must be 0 to 1")
+    if getattr(current_process(), "_inheriting", False):
+        # A new process imports the script before its first task.
+        raise RuntimeError(NO_GUARD)
+    size = None if chunk is None else _check.whole("chunk", chunk, 1)
+    path = None if out is None else Path(_check.path("out", out))
+    asked, keys = _asked(run, runs)
+    if shard is not None:
+        part = _part(shard, len(keys))
+        asked, keys = asked[part], keys[part]
+    left_out = set(_check.words("timed", timed))
+    made = _engine(engine, workers, run, bool(timing))
+    with _Store(path, keys) as store:
+        state = _Survey(run, asked, keys, store, share, left_out, on_error, size, _Progress(len(keys), progress))
+        state.go_through(made)
+    return store.rows(keys)
+
+
+def merge(
+    run: Run,
+    runs: Iterable[Mapping[str, Any]],
+    parts: Iterable[str | os.PathLike[str]],
+    *,
+    out: str | os.PathLike[str] | None = None,
+    timed: Collection[str] = (),
+) -> Rows:
+    """Join the rows of the files `parts`, which `survey` wrote with `shard`, in the order of `runs`. `run`, `runs` and
+    `timed` are those of the survey. `out` is the file for all rows.
+
+    ValueError: a row is missing, because a part is incomplete or another program wrote it. NotTheSame: two parts have
+    different results for one run. OSError: a file cannot be read or written.
+
+    >>> import drystone as ds, pathlib, tempfile
+    >>> from drystone.studies import stands
+    >>> runs = [{"scene": "tower", "n": n, "steps": 10} for n in (2, 3)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     parts = [pathlib.Path(folder, f"{k}.jsonl") for k in (1, 2)]
+    ...     for k, part in enumerate(parts, 1):
+    ...         _ = ds.survey(stands, runs, out=part, engine="here", shard=(k, 2))
+    ...     rows = ds.survey.merge(stands, runs, parts)
+    >>> [row["n"] for row in rows]
+    [2, 3]
+    """
+    asked, keys = _asked(run, runs)
+    left_out = {"key", *_check.words("timed", timed)}
+    lines: dict[str, tuple[str, str]] = {}
+    for part in parts:
+        path = _check.path("parts", part)
+        for line in Path(path).read_text().split("\n"):
+            key = _key_of(line)
+            if key is not None:
+                if key in lines:
+                    first, again = (
+                        {name: value for name, value in json.loads(text).items() if name not in left_out}
+                        for text in (lines[key][0], line)
+                    )
+                    if not _same(first, again):
+                        given = asked[keys.index(key)] if key in keys else key
+                        raise NotTheSame(given, (first, again), (lines[key][1], path))
+                lines.setdefault(key, (line, path))
+    missing = [one for key, one in zip(keys, asked, strict=True) if key not in lines]
+    if missing:
+        raise ValueError(f"parts: {len(missing)} of {len(keys)} rows are missing, first that of {missing[0]}")
+    with _Store(None if out is None else Path(_check.path("out", out)), keys) as store:
+        store.have = {key: lines[key][0] for key in keys}
+    return store.rows(keys)
+
+
+def _asked(run: Run, runs: Any) -> tuple[list[dict[str, Any]], list[str]]:
+    """The arguments of a survey, and their keys."""
     if not callable(run):
         raise ValueError(f"run is {type(run).__name__}: must be a function of one argument")
-    size = None if chunk is None else _check.whole("chunk", chunk, 1)
+    if isinstance(runs, (str, bytes, Mapping)) or not isinstance(runs, Iterable):
+        raise ValueError(f"runs is {type(runs).__name__}: must be a list of dicts")
     asked = [_plain_run(k, one) for k, one in enumerate(runs)]
-    keys = _keys(run, asked)
-    with _Store(None if out is None else Path(out), keys) as store:
-        state = _Survey(run, asked, keys, store, share, set(timed), on_error, size, _Progress(len(keys), progress))
-        state.go_through(_engine(engine, workers))
-    return store.rows(keys)
+    return asked, _keys(run, asked)
+
+
+def _part(shard: Any, count: int) -> slice:
+    """The runs of a part."""
+    if not isinstance(shard, (tuple, list)) or len(shard) != 2:
+        raise ValueError(f"shard = {shard!r}: must be two numbers, such as (2, 4)")
+    number, parts = (_check.whole("shard", one, 1) for one in shard)
+    if number > parts:
+        raise ValueError(f"shard = {shard!r}: must be at most ({parts}, {parts})")
+    return slice(number - 1, count, parts)
 
 
 def _plain_run(k: int, one: Any) -> dict[str, Any]:
     try:
-        plain: dict[str, Any] = json.loads(json.dumps(dict(one)))
+        argument: dict[str, Any] = json.loads(json.dumps(plain(dict(one))))
     except (TypeError, ValueError) as error:
         raise ValueError(f"runs[{k}] = {one!r}: must be a dict of numbers, strings and lists ({error})") from None
-    return plain
+    if "key" in argument:
+        raise ValueError(f"runs[{k}] has 'key': this name is for the key of a row")
+    return argument
 
 
 def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
@@ -157,7 +279,7 @@ def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
         source = inspect.getsource(run)
     except (OSError, TypeError):
         source = repr(run)
-    program = hashlib.sha256(Path(str(_drystone.__file__)).read_bytes()).hexdigest()
+    program = _program()
     seen: dict[str, int] = {}
     keys = []
     for one in asked:
@@ -165,6 +287,12 @@ def _keys(run: Run, asked: list[dict[str, Any]]) -> list[str]:
         count = seen[text] = seen.get(text, -1) + 1
         keys.append(hashlib.sha256(f"{text}{count or ''}".encode()).hexdigest()[:20])
     return keys
+
+
+@cache
+def _program() -> str:
+    """A hash of the program."""
+    return hashlib.sha256(Path(str(_drystone.__file__)).read_bytes()).hexdigest()
 
 
 def _machine() -> str:
@@ -180,6 +308,8 @@ def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | Non
         begin = time.perf_counter()
         try:
             result = plain(dict(run(dict(one))))
+            if "key" in result:
+                raise ValueError("the result has 'key': this name is for the key of a row")
         except Exception as error:
             if on_error == "raise":
                 raise
@@ -189,7 +319,7 @@ def _compute(run: Run, part: list[tuple[str, dict[str, Any]]], not_by: str | Non
 
 
 def plain(value: Any) -> Any:
-    """A result in the form of JSON, with every number to the last bit."""
+    """An argument or a result in the form of JSON, with every number to the last bit."""
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, np.ndarray):
@@ -200,7 +330,7 @@ def plain(value: Any) -> Any:
         return [plain(one) for one in value]
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
-    raise TypeError(f"a result has {type(value).__name__}: must have numbers, strings and small arrays")
+    raise TypeError(f"{type(value).__name__}: must be numbers, strings and small arrays")
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -367,14 +497,32 @@ class _Engine(Protocol):
     def next(self) -> tuple[int, list[Row] | None]: ...
 
 
-def _engine(name: str, workers: int | None) -> _Engine:
+def _engine(name: str, workers: int | None, run: Run, timing: bool) -> _Engine:
     count = None if workers is None else _check.whole("workers", workers, 1)
     if name == "auto":
         ray = sys.modules.get("ray")
         name = "ray" if ray is not None and ray.is_initialized() else "processes"
     if name == "here":
         return _Here()
-    return _Ray() if name == "ray" else _Processes(count or os.cpu_count() or 1)
+    if name == "ray":
+        return _Ray(timing)
+    _check_found(run)
+    return _Processes(1 if timing else count or os.cpu_count() or 1)
+
+
+def _check_found(run: Run) -> None:
+    """Refuse a function that a new process cannot import."""
+    try:
+        pickle.dumps(run)
+    except Exception as error:
+        raise ValueError(
+            f"run = {run!r}: must be a function of a module, or engine be 'here', since other processes import it ({error})"
+        ) from None
+    main = sys.modules.get("__main__")
+    if getattr(run, "__module__", None) == "__main__" and not os.path.exists(getattr(main, "__file__", None) or ""):
+        raise ValueError(
+            f"run = {run!r}: must be in a file, or engine be 'here', since other processes cannot import an interactive session"
+        )
 
 
 class _Here:
@@ -401,8 +549,9 @@ class _Here:
         return number, work()
 
 
-def _ignore_interrupts() -> None:
+def _begin_worker(has_begun: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    has_begun.set()
 
 
 @dataclass
@@ -425,6 +574,8 @@ class _Processes:
         self.numbers = 0
 
     def __enter__(self) -> _Processes:
+        self.context = get_context("spawn")
+        self.has_begun = self.context.Event()
         self.workers = [_Worker(self._new_pool()) for _ in range(self.count)]
         return self
 
@@ -432,9 +583,8 @@ class _Processes:
         for worker in self.workers:
             worker.pool.shutdown(wait=not worker.tasks, cancel_futures=True)
 
-    @staticmethod
-    def _new_pool() -> futures.ProcessPoolExecutor:
-        return futures.ProcessPoolExecutor(1, get_context("spawn"), initializer=_ignore_interrupts)
+    def _new_pool(self) -> futures.ProcessPoolExecutor:
+        return futures.ProcessPoolExecutor(1, self.context, _begin_worker, (self.has_begun,))
 
     def submit(self, work: Callable[[], list[Row] | None], not_by: str | None) -> int:
         self.numbers += 1
@@ -467,20 +617,33 @@ class _Processes:
 
     def _replace(self, worker: _Worker) -> None:
         """Start a new process in place of a dead one, with the same tasks."""
+        if not self.has_begun.is_set():
+            raise RuntimeError(f"no worker got to its first run: its error is above. Perhaps {NO_GUARD}")
         tasks = sorted(worker.tasks)
         for first in tasks[:1]:
             self.deaths[first] = self.deaths.get(first, 0) + 1
             if self.deaths[first] >= MAX_DEATHS:
-                raise RuntimeError(f"a run ended its worker {MAX_DEATHS} times: {self.work[first]}")
+                raise RuntimeError(f"a run ended its worker {MAX_DEATHS} times: {_runs_of(self.work[first])}")
         worker.pool.shutdown(wait=False, cancel_futures=True)
         worker.pool, worker.machine = self._new_pool(), None
         worker.tasks = {number: worker.pool.submit(self.work[number]) for number in tasks}
 
 
+def _runs_of(work: Callable[[], list[Row] | None]) -> str:
+    """The runs of a task in words."""
+    runs = [one for _, one in work.args[1]] if isinstance(work, partial) else [work]
+    return str(runs[0]) if len(runs) == 1 else f"one of {runs}"
+
+
+def _share_of_machine(processors: Collection[float]) -> int:
+    """Number of processors for a task, so that no machine of the cluster has room for two tasks."""
+    return int(max(processors, default=1)) // 2 + 1
+
+
 class _Ray:
     """A Ray cluster. Ray repeats the tasks of dead workers and nodes."""
 
-    def __init__(self) -> None:
+    def __init__(self, timing: bool = False) -> None:
         try:
             self.ray: Any = importlib.import_module("ray")
         except ImportError:
@@ -488,13 +651,19 @@ class _Ray:
         self.running: dict[Any, int] = {}
         self.count = 0
         # Nodes come and go, and a query for them takes as long as a task.
-        self.processors, self.asked = 1, -1.0
+        self.workers, self.asked = 1, -1.0
+        self.timing, self.each = timing, 1
 
     def __enter__(self) -> _Ray:
         if not self.ray.is_initialized():
             self.ray.init(log_to_driver=False)
-        self.task = self.ray.remote(max_retries=-1, num_cpus=1)(_call)
+        self.each = _share_of_machine(self._processors()) if self.timing else 1
+        self.task = self.ray.remote(max_retries=-1, num_cpus=self.each)(_call)
         return self
+
+    def _processors(self) -> list[float]:
+        """Number of processors of each node."""
+        return [node.get("Resources", {}).get("CPU", 0.0) for node in self.ray.nodes() if node["Alive"]]
 
     def __exit__(self, *_: object) -> None:
         for reference in self.running:
@@ -503,9 +672,9 @@ class _Ray:
     @property
     def room(self) -> int:
         if time.monotonic() > self.asked + 1:
-            self.processors = max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+            self.workers = max(1, sum(int(count // self.each) for count in self._processors()))
             self.asked = time.monotonic()
-        return TASKS_A_WORKER * self.processors
+        return TASKS_A_WORKER * self.workers
 
     @property
     def has_others(self) -> bool:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
-import gymnasium
 import numpy as np
+
+try:
+    import gymnasium
+except ImportError as error:
+    raise ImportError("Gymnasium is not installed: pip install 'drystone[gym]'") from error
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
@@ -24,19 +29,24 @@ Reward = Callable[[Batch, NDArray[Any]], NDArray[Any]]
 Terminated = Callable[[Batch], NDArray[np.bool_]]
 Act = Callable[[Batch, NDArray[Any]], None]
 Start = Callable[[np.random.Generator, Batch, int], None]
+RENDER_MODES = ["rgb_array"]
 
 
 class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
     """A batch as parallel environments.
 
     `observe(batch)` returns [W, ...], `reward(batch, actions)` [W], and `terminated(batch)` bool [W]. `act(batch,
-    actions)` writes inputs. `start(rng, batch, world)` changes a world after its reset. `memory` has the arrays that
-    these functions keep from step to step, so that `state` saves them. An action lasts `frame_skip` steps, and an
-    episode is truncated after `max_steps` actions.
+    actions)` writes inputs; None sets `ctrl` to the actions. `start(rng, batch, world)` changes a world after its
+    reset. `memory` has the arrays that these functions keep from step to step, so that `state` saves them. An action
+    lasts `frame_skip` steps, and an episode is truncated after `max_steps` actions.
 
     All three autoreset modes are supported. World k has the seed s + k, or the k-th seed of a list. Its n-th episode
     depends only on that seed and n, not on other worlds. A failed world is terminated, infos["error"] has the reason,
-    and the next reset repairs it.
+    and the next reset repairs it. The arrays that `reset` and `step` return are copies.
+
+    With the render mode "rgb_array", `render` returns one picture for each world, [480, 640, 3] (`Batch.picture`).
+
+    ValueError: an argument is invalid, or a function returns another shape.
 
     >>> from drystone.gym import cart_pole
     >>> envs = cart_pole(4)
@@ -53,7 +63,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
         action_space: spaces.Space[Any],
         observe: Observe,
         reward: Reward,
-        act: Act,
+        act: Act | None = None,
         terminated: Terminated | None = None,
         start: Start | None = None,
         observation_space: spaces.Space[Any] | None = None,
@@ -61,13 +71,25 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
         max_steps: int | None = None,
         frame_skip: int = 1,
         autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
     ) -> None:
-        self.batch = batch
+        self.batch = _check.kind_of("batch", batch, Batch)
         self.num_envs = batch.num_worlds
-        self.metadata = {"render_modes": [], "autoreset_mode": AutoresetMode(autoreset_mode)}
-        self._observe, self._reward, self._act = observe, reward, act
+        if not isinstance(autoreset_mode, AutoresetMode):
+            names = ", ".join(f"AutoresetMode.{mode.name}" for mode in AutoresetMode)
+            raise ValueError(f"autoreset_mode = {autoreset_mode!r}: must be one of {names}")
+        self.metadata = {"render_modes": RENDER_MODES, "autoreset_mode": autoreset_mode}
+        if render_mode is not None:
+            _check.one_of("render_mode", render_mode, RENDER_MODES)
+        self.render_mode = render_mode
+        if act is None and action_space.shape != (batch.num_actuators,):
+            raise ValueError(f"action_space has shape {action_space.shape}: must be ({batch.num_actuators},), or act be given")
+        self._observe, self._reward, self._act = observe, reward, act or _set_ctrl
         self._terminated, self._start, self._memory = terminated, start, memory or {}
-        self._max_steps, self._frame_skip = max_steps, frame_skip
+        self._max_steps = None if max_steps is None else _check.whole("max_steps", max_steps, 1)
+        self._frame_skip = _check.whole("frame_skip", frame_skip, 1)
+        if batch._scenes:
+            self.metadata["render_fps"] = max(1, round(1 / (batch._scenes[0].dt * self._frame_skip)))
         shape = np.asarray(observe(batch)).shape
         if shape[:1] != (batch.num_worlds,):
             raise ValueError(f"observe gives shape {shape}: must begin with {batch.num_worlds}, the number of worlds")
@@ -88,17 +110,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
         ValueError: the number of seeds is wrong, or the mask is not a bool array [W] with a True.
         """
         mask = self._mask(options)
-        seeds: Sequence[int | None]
-        if seed is None or isinstance(seed, (int, np.integer)):
-            seeds = [None if seed is None else int(seed) + k for k in range(self.num_envs)]
+        seeds: list[int | None]
+        if isinstance(seed, (list, tuple, np.ndarray)):
+            seeds = [None if one is None else _check.whole("seed", one) for one in seed]
         else:
-            seeds = seed
+            first = None if seed is None else _check.whole("seed", seed)
+            seeds = [None if first is None else first + k for k in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed has {len(seeds)} numbers: must have {self.num_envs}")
         for world in np.flatnonzero(mask):
             own = seeds[int(world)]
             if own is not None:
-                self._seeds[world], self._episodes[world] = int(own), -1
+                self._seeds[world], self._episodes[world] = own, -1
         self._begin(mask)
         return self._observations(), {}
 
@@ -117,13 +140,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
         begins = self._is_over.copy()
         if begins.any() and mode is not AutoresetMode.NEXT_STEP:
             raise RuntimeError(f"the episode of world {np.flatnonzero(begins)[0]} is over: reset it by its mask")
+        if not begins.all():
+            self._act(self.batch, actions)
         if begins.any():
+            # After the action, which has no effect on these worlds.
             self._begin(begins)
         infos: dict[str, Any] = {}
-        failed = self._go(actions, ~begins, infos)
+        failed = self._go(~begins, infos)
         observations = self._observations()
-        rewards = np.array(self._reward(self.batch, actions), np.float64)
-        terminated = failed if self._terminated is None else failed | np.asarray(self._terminated(self.batch), bool)
+        rewards = self._of_worlds("reward", self._reward(self.batch, actions)).astype(np.float64)
+        terminated = failed
+        if self._terminated is not None:
+            terminated = failed | self._of_worlds("terminated", self._terminated(self.batch)).astype(bool)
         truncated = np.zeros(self.num_envs, bool)
         if self._max_steps is not None:
             truncated = (self._elapsed >= self._max_steps) & ~terminated
@@ -131,12 +159,20 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
         terminated, truncated = terminated & ~begins, truncated & ~begins
         self._is_over = terminated | truncated
         if mode is AutoresetMode.SAME_STEP and self._is_over.any():
-            observations = self._begin_at_once(observations, infos)
+            observations, infos = self._begin_at_once(observations, infos)
         return observations, rewards, terminated, truncated, infos
 
     def state(self) -> bytes:
         """The state of all environments: worlds, inputs, episodes, seeds and memory. From it they continue with the
         same bits.
+
+        >>> from drystone.gym import cart_pole
+        >>> envs, others = cart_pole(2), cart_pole(2)
+        >>> _ = envs.reset(seed=1), others.reset(seed=7)
+        >>> others.set_state(envs.state())
+        >>> actions = envs.action_space.sample()
+        >>> bool((envs.step(actions)[0] == others.step(actions)[0]).all())
+        True
         """
         inputs = {name: getattr(self.batch, name).copy() for name in ("force", "torque", "ctrl", "gravity")}
         clocks = (list(self._seeds), self._episodes.copy(), self._elapsed.copy(), self._is_over.copy())
@@ -145,11 +181,16 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
     def set_state(self, state: bytes) -> None:
         """Continue from a state of `state`, also of another process. The state is a pickle: load only trusted states.
 
-        ValueError: the state has another number of worlds.
+        ValueError: the state has another number of worlds or other memory, or is not a state.
         """
-        worlds, inputs, clocks, memory = pickle.loads(state)
+        try:
+            worlds, inputs, clocks, memory = pickle.loads(state)
+        except Exception:
+            raise ValueError("state: must be the bytes of `state`, unchanged") from None
         if len(worlds) != self.num_envs:
             raise ValueError(f"state has {len(worlds)} worlds: must have {self.num_envs}")
+        if set(memory) != set(self._memory):
+            raise ValueError(f"state has the memory {sorted(memory)}: must have {sorted(self._memory)}")
         self.batch.restore(Snapshots.from_bytes(worlds))
         for name, value in inputs.items():
             setattr(self.batch, name, value)
@@ -177,11 +218,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
                 rng = np.random.default_rng([self._seeds[world], int(self._episodes[world])])
                 self._start(rng, self.batch, int(world))
 
-    def _go(self, actions: NDArray[Any], mask: NDArray[np.bool_], infos: dict[str, Any]) -> NDArray[np.bool_]:
+    def _go(self, mask: NDArray[np.bool_], infos: dict[str, Any]) -> NDArray[np.bool_]:
         failed = np.zeros(self.num_envs, bool)
-        if not mask.any():
-            return failed
-        self._act(self.batch, actions)
         try:
             self.batch.step(self._frame_skip, worlds=mask)
         except WorldError as error:
@@ -192,25 +230,54 @@ class VectorEnv(gymnasium.vector.VectorEnv[Floats, NDArray[Any], NDArray[Any]]):
         self._elapsed[mask] += 1
         return failed
 
-    def _begin_at_once(self, observations: Floats, infos: dict[str, Any]) -> Floats:
+    def _begin_at_once(self, observations: Floats, infos: dict[str, Any]) -> tuple[Floats, dict[str, Any]]:
         mask = self._is_over.copy()
-        finals, of_finals = np.full(self.num_envs, None, object), np.full(self.num_envs, None, object)
         for world in np.flatnonzero(mask):
-            finals[world] = observations[world].copy()
-            of_finals[world] = {name: value[world] for name, value in infos.items() if not name.startswith("_")}
-        infos.update({"final_obs": finals, "_final_obs": mask, "final_info": of_finals, "_final_info": mask.copy()})
+            own = {name: infos[name][world] for name in ("error",) if name in infos and infos[f"_{name}"][world]}
+            infos = self._add_info(infos, {"final_obs": observations[world].copy(), "final_info": own}, int(world))
         self._begin(mask)
-        return self._observations()
+        return self._observations(), infos
 
     def _observations(self) -> Floats:
-        return np.array(self._observe(self.batch), np.float32)
+        return np.array(self._observe(self.batch), self.single_observation_space.dtype)
+
+    def _of_worlds(self, name: str, value: Any) -> NDArray[Any]:
+        """One number for each world, from a function of the caller."""
+        array = np.array(value)
+        if array.shape != (self.num_envs,):
+            raise ValueError(f"{name} gives shape {array.shape}: must be ({self.num_envs},)")
+        return array
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """One picture for each world, [480, 640, 3], or None without a render mode.
+
+        AdapterError: there is no adapter.
+        """
+        if self.render_mode is None:
+            return None
+        return tuple(self.batch.picture(world) for world in range(self.num_envs))
+
+
+def _set_ctrl(batch: Batch, actions: NDArray[Any]) -> None:
+    batch.ctrl[...] = actions
 
 
 class Env(gymnasium.Env[Floats, NDArray[Any]]):
-    """A single environment, over a `VectorEnv` of one world."""
+    """A single environment, over a `VectorEnv` of one world. `make` is a function such as `cart_pole`, and gets the
+    options.
+
+    >>> from drystone.gym import Env, cart_pole
+    >>> env = Env(cart_pole, max_steps=100)
+    >>> observation, info = env.reset(seed=1)
+    >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+    >>> observation.shape, reward, terminated
+    ((4,), 1.0, False)
+    """
 
     def __init__(self, make: Callable[..., VectorEnv], **options: Any) -> None:
         self.envs = make(1, autoreset_mode=AutoresetMode.DISABLED, **options)
+        self.metadata = {name: value for name, value in self.envs.metadata.items() if name != "autoreset_mode"}
+        self.render_mode = self.envs.render_mode
         self.observation_space = self.envs.single_observation_space
         self.action_space = self.envs.single_action_space
 
@@ -225,7 +292,13 @@ class Env(gymnasium.Env[Floats, NDArray[Any]]):
     def step(self, action: NDArray[Any]) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Make one action."""
         observations, rewards, terminated, truncated, infos = self.envs.step(np.asarray(action)[None])
-        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), infos
+        info = {name: value[0] for name, value in infos.items() if not name.startswith("_")}
+        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture [480, 640, 3], or None without a render mode."""
+        pictures = self.envs.render()
+        return None if pictures is None else pictures[0]
 
 
 HALF_POLE, MAX_ANGLE, MAX_WAY, PUSH = 0.5, 0.21, 2.4, 10.0
@@ -246,12 +319,18 @@ def cart_pole(
     max_steps: int = 500,
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+    render_mode: str | None = None,
 ) -> VectorEnv:
     """Push a cart (1 kg, up to 10 N) so that the pole on it (0.1 kg, 1 m) stays upright. The reward is 1 for each step
     of 1/50 s.
 
     Observations: position and speed of the cart (m, m/s), angle and angular velocity of the pole (rad, rad/s). An
     episode ends beyond 2.4 m or 0.21 rad.
+
+    >>> from drystone.gym import cart_pole
+    >>> observations, _ = cart_pole(3).reset(seed=[5, 6, 5])
+    >>> bool((observations[0] == observations[2]).all()), bool((observations[0] == observations[1]).all())
+    (True, False)
     """
     batch = Batch(_cart_and_pole(), num_envs, config=Config(sleep=False), num_threads=num_threads)
 
@@ -290,6 +369,7 @@ def cart_pole(
         start=start,
         max_steps=max_steps,
         autoreset_mode=autoreset_mode,
+        render_mode=render_mode,
     )
 
 
@@ -299,6 +379,7 @@ def drawbridge(
     max_steps: int = 300,
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+    render_mode: str | None = None,
 ) -> VectorEnv:
     """Hold a deck with a crate at a target angle, by the speeds of two winches (m/s, up to 0.5). Each episode draws the
     angle.
@@ -306,6 +387,12 @@ def drawbridge(
     Observations: angle and angular velocity of the deck (rad, rad/s), target angle (rad), position and velocity of the
     crate (m, m/s). The reward is minus the distance between angle and target. An episode ends when the crate falls off
     the deck.
+
+    >>> from drystone.gym import drawbridge
+    >>> envs = drawbridge(2)
+    >>> observations, _ = envs.reset(seed=1)
+    >>> observations.shape, envs.single_action_space.shape
+    ((2, 9), (2,))
     """
     batch = Batch(Scene.find("drawbridge"), num_envs, config=Config(sleep=False), num_threads=num_threads)
     wanted = np.zeros(num_envs, np.float32)
@@ -334,6 +421,7 @@ def drawbridge(
         start=start,
         max_steps=max_steps,
         autoreset_mode=autoreset_mode,
+        render_mode=render_mode,
     )
 
 
@@ -402,6 +490,7 @@ def maze(
     max_steps: int = 1200,
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+    render_mode: str | None = None,
 ) -> VectorEnv:
     """Tilt a board so that a ball rolls to the goal and past the holes. `board` is easy, medium, hard or a file
     (docs/maze.md).
@@ -476,6 +565,7 @@ def maze(
         max_steps=max_steps,
         frame_skip=MAZE_SKIP,
         autoreset_mode=autoreset_mode,
+        render_mode=render_mode,
     )
 
 
@@ -505,6 +595,7 @@ def cart_on_drawbridge(
     max_steps: int = 400,
     num_threads: int = 0,
     autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+    render_mode: str | None = None,
 ) -> VectorEnv:
     """Lower a drawbridge of 4 m by its winch, and drive a cart with four wheels over it to the far road.
 
@@ -550,8 +641,8 @@ def cart_on_drawbridge(
         batch.set_state(worlds=[world], bodies=[deck], position=[[place]], rotation=[[rotation]])
 
     def reward(batch: Batch, actions: NDArray[Any]) -> NDArray[Any]:
-        ahead: NDArray[Any] = batch.linear_velocity[:, cart, 0] * (skip * scene.dt)
-        return ahead + 10 * is_over(batch)
+        rewards: NDArray[Any] = batch.linear_velocity[:, cart, 0] * (skip * scene.dt) + 10 * is_over(batch)
+        return rewards
 
     return VectorEnv(
         batch,
@@ -564,4 +655,15 @@ def cart_on_drawbridge(
         max_steps=max_steps,
         frame_skip=skip,
         autoreset_mode=autoreset_mode,
+        render_mode=render_mode,
     )
+
+
+# `gymnasium.make` and `gymnasium.make_vec` find these after `import drystone.gym`.
+for _name, _make in {
+    "CartPole": cart_pole,
+    "Drawbridge": drawbridge,
+    "Maze": maze,
+    "CartOnDrawbridge": cart_on_drawbridge,
+}.items():
+    gymnasium.register(f"drystone/{_name}-v0", partial(Env, _make), vector_entry_point=f"{__name__}:{_make.__name__}")

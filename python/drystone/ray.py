@@ -5,13 +5,13 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _check
-from ._batch import Batch, Snapshots
+from ._batch import COLUMNS, MEASURES, Batch, Snapshots, WorldError
 from ._scene import Config, Scene
 
 # Number of times that one call may end its actor.
@@ -48,9 +48,19 @@ class Fleet:
     """Worlds 0 to num_worlds - 1 of a scene, distributed over actors with `worlds_per_actor` worlds each.
 
     If an actor dies, with its process or its machine, it is rebuilt from bytes that are kept here every `keep_every`
-    rollouts, and from the calls since then. All hashes are the same as without the loss. Ray must be initialized.
+    rollouts, and from the calls since then. All hashes are the same as without the loss. Ray must be initialized. As a
+    context, `with Fleet(...) as fleet:`, it ends the actors at the end.
 
-    ValueError: an argument is invalid. RuntimeError: a call ended its actor ten times.
+    `rebuilt` is the number of rebuilt actors.
+
+    ValueError: an argument is invalid, or Ray is not initialized. RuntimeError: a call ended its actor ten times.
+
+    >>> import ray, drystone as ds  # doctest: +SKIP
+    >>> _ = ray.init()  # doctest: +SKIP
+    >>> with ds.ray.Fleet(ds.Scene.find("drawbridge"), 100, worlds_per_actor=25) as fleet:  # doctest: +SKIP
+    ...     out = fleet.rollout(60, record=("position", "hash"), every=60)
+    ...     print(out["position"].shape, bool((out["hash"][:, 0] == fleet.hash()).all()))
+    (100, 1, 3, 3) True
     """
 
     def __init__(
@@ -66,11 +76,14 @@ class Fleet:
         self.num_worlds = _check.whole("num_worlds", num_worlds, 1)
         each = _check.whole("worlds_per_actor", worlds_per_actor, 1)
         self._keep_every = _check.whole("keep_every", keep_every, 1)
+        if _check.number("cpus_per_actor", cpus_per_actor) < 0:
+            raise ValueError(f"cpus_per_actor = {cpus_per_actor}: must be 0 or more")
+        self._scene = _check.kind_of("scene", scene, Scene)
+        self._config = Config() if config is None else _check.kind_of("config", config, Config)
         self._ray = _ray()
         if not self._ray.is_initialized():
             raise ValueError("Ray is not initialized: call ray.init first")
         self._actor = self._ray.remote(max_restarts=0, num_cpus=cpus_per_actor)(_Worlds)
-        self._scene, self._config = scene, config or Config()
         self._shares = [_Share(k, min(each, num_worlds - k)) for k in range(0, num_worlds, each)]
         self.rebuilt = 0
         for share in self._shares:
@@ -81,9 +94,13 @@ class Fleet:
     ) -> dict[str, NDArray[Any]]:
         """`Batch.rollout` of all worlds. `ctrl` is [num_worlds or 1, n or 1, U], and the first axis of arrays is
         num_worlds.
+
+        ValueError: an argument is invalid. WorldError: some worlds failed; all others completed the call.
         """
-        numbers = None if ctrl is None else np.asarray(ctrl, np.float32)
-        if numbers is not None and (numbers.ndim != 3 or numbers.shape[0] not in (1, self.num_worlds)):
+        n, every = _check.whole("n", n), _check.whole("every", every, 1)
+        record = _check.words("record", record, [*COLUMNS, *MEASURES, "hash"])
+        numbers = None if ctrl is None else _check.numbers("ctrl", ctrl, (-1, -1, -1))
+        if numbers is not None and numbers.shape[0] not in (1, self.num_worlds):
             raise ValueError(f"ctrl has shape {numbers.shape}: must be ({self.num_worlds} or 1, {n} or 1, U)")
 
         def arguments(share: _Share) -> tuple[tuple[Any, ...], dict[str, Any]]:
@@ -94,7 +111,7 @@ class Fleet:
 
         parts = self._all("rollout", arguments, changes=True)
         self._keep()
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return _joined(parts)
 
     def reset(self, worlds: ArrayLike | None = None) -> None:
         """`Batch.reset` of some worlds, or of all."""
@@ -111,13 +128,24 @@ class Fleet:
 
     def measure(self, *names: str) -> dict[str, NDArray[np.float64]]:
         """`Batch.measure` of all worlds."""
-        parts = self._all("measure", lambda share: (names, {}))
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return _joined(self._all("measure", lambda share: (names, {})))
 
     def close(self) -> None:
         """End the actors."""
         for share in self._shares:
             self._ray.kill(share.actor)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        return self.num_worlds
+
+    def __repr__(self) -> str:
+        return f"<Fleet of {self.num_worlds} worlds on {len(self._shares)} actors>"
 
     @staticmethod
     def _own(share: _Share, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -133,13 +161,19 @@ class Fleet:
         arguments: Callable[[_Share], tuple[tuple[Any, ...], dict[str, Any]]],
         changes: bool = False,
     ) -> list[Any]:
-        """Call all actors at the same time, and return their results."""
+        """Call all actors at the same time, and return their results. Worlds that fail have their numbers in the
+        fleet."""
         calls = [(name, *arguments(share)) for share in self._shares]
         running = [share.actor.do.remote(*call) for share, call in zip(self._shares, calls, strict=True)]
-        results, first_error = [], None
-        for of in zip(self._shares, calls, running, strict=True):
+        results: list[Any] = []
+        failed: list[WorldError] = []
+        first_error: Exception | None = None
+        for share, call, result in zip(self._shares, calls, running, strict=True):
             try:
-                results.append(self._get(*of))
+                results.append(self._get(share, call, result))
+            except WorldError as error:
+                failed.append(WorldError(error.worlds + share.first, error.messages))
+                results.append(error.records)
             except Exception as error:
                 first_error = first_error or error
         if changes:
@@ -148,6 +182,11 @@ class Fleet:
                 share.since.append(call)
         if first_error is not None:
             raise first_error
+        if failed:
+            lines = [line for error in failed for line in error.messages]
+            together = WorldError(np.concatenate([error.worlds for error in failed]), lines)
+            together.records = _joined(results)
+            raise together
         return results
 
     def _get(self, share: _Share, call: tuple[str, tuple[Any, ...], dict[str, Any]], running: Any) -> Any:
@@ -162,7 +201,8 @@ class Fleet:
                     share.actor.do.remote(*before)
                 running = share.actor.do.remote(*call)
             except self._ray.exceptions.RayTaskError as error:
-                raise error.as_instanceof_cause() from None
+                # Its own line, without the traceback of the actor.
+                raise (error.cause if isinstance(error.cause, Exception) else error) from None
         raise RuntimeError(f"{call[0]} ended the actor of worlds {share.first} and on {MAX_DEATHS} times")
 
     def _keep(self) -> None:
@@ -170,6 +210,11 @@ class Fleet:
         if all(len(share.since) >= self._keep_every for share in self._shares):
             for share, kept in zip(self._shares, self._all("save", lambda share: ((), {})), strict=True):
                 share.kept, share.since = kept, []
+
+
+def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """The arrays of all actors, one after another."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def _ray() -> Any:

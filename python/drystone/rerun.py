@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from types import TracebackType
 from typing import Any, Self
 
@@ -12,9 +12,15 @@ import numpy as np
 
 from . import _check
 from ._batch import MEASURES, Batch
+from ._scene import Scene
 
 # Length of an arrow per impulse (m/(N s)): 1 m for the weight of a ton over a step of 1/60 s.
 ARROW = 1 / 163.5
+
+# Rotation of the z axis to the y axis.
+Z_TO_Y = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)
+# Corners of the base of a cone.
+CORNERS = 24
 
 
 class log:
@@ -22,15 +28,21 @@ class log:
 
     Use it as a context, `with drystone.rerun.log(batch, to="run.rrd") as run:`, and call `run.step(n)` instead of
     `batch.step(n)`. It writes a frame after every `every` steps. Contacts have impulses if the batch listens to
-    "impulses". The shapes are those of `Scene.to_dict`, in the order of the bodies.
+    "impulses". `scene` gives the shapes; None is the scene of the world. A batch that was loaded from states needs it.
+    Hulls are drawn as points, and half-spaces and height fields are not drawn.
 
     ValueError: an argument is invalid, or rerun is not installed.
+
+    >>> import drystone as ds
+    >>> batch = ds.Batch(ds.Scene.find("tower", n=3), listen=["impulses"])
+    >>> with ds.rerun.log(batch, to="run.rrd", every=5) as run:  # doctest: +SKIP
+    ...     run.step(60)
     """
 
     def __init__(
         self,
         batch: Batch,
-        scene: dict[str, Any] | None = None,
+        scene: Scene | Mapping[str, Any] | None = None,
         *,
         world: int = 0,
         to: str | os.PathLike[str],
@@ -42,12 +54,24 @@ class log:
             self._rerun: Any = importlib.import_module("rerun")
         except ImportError:
             raise ValueError("rerun is not installed: pip install 'drystone[rerun]'") from None
-        self._batch, self._to = batch, os.fspath(to)
+        self._batch, self._to = _check.kind_of("batch", batch, Batch), _check.path("to", to)
         self._world = int(_check.worlds([world], batch.num_worlds, "world")[0])
         self._every = _check.whole("every", every, 1)
         self._contacts = contacts
-        self._measures = [_check.one_of("measures", name, MEASURES) for name in measures]
-        self._bodies = (scene or {"bodies": []})["bodies"]
+        self._measures = _check.words("measures", measures, MEASURES)
+        self._bodies = self._shapes_of(scene)
+
+    def _shapes_of(self, scene: Any) -> list[dict[str, Any]]:
+        """The bodies of a scene file."""
+        if scene is None:
+            if not self._batch._scenes:
+                raise ValueError("scene is None: must be a Scene, because the batch was loaded from states")
+            scene = self._batch._scenes[self._world]
+        data = scene.to_dict() if isinstance(scene, Scene) else scene
+        if not isinstance(data, Mapping) or "bodies" not in data:
+            raise ValueError(f"scene is {type(scene).__name__}: must be a Scene, or a dict as of Scene.to_dict")
+        bodies: list[dict[str, Any]] = data["bodies"]
+        return bodies
 
     def __enter__(self) -> Self:
         self._recording = self._rerun.RecordingStream("drystone")
@@ -103,11 +127,20 @@ class log:
             mesh = rerun.Boxes3D(half_sizes=[shape["half_extents"]])
         elif kind == "ball":
             mesh = rerun.Ellipsoids3D(radii=[shape["radius"]])
-        elif kind in ("capsule", "cylinder", "cone"):
-            height, radius = shape["half_height"], shape["radius"]
-            mesh = rerun.Boxes3D(half_sizes=[[radius, height + (radius if kind == "capsule" else 0), radius]])
-        elif kind in ("convex_hull", "mesh"):
-            mesh = rerun.Points3D(shape.get("points", shape.get("vertices")))
+        elif kind in ("capsule", "cylinder"):
+            half, radius = shape["half_height"], shape["radius"]
+            # Those of rerun are along z, and a capsule begins at the origin.
+            upright = {"lengths": [2 * half], "radii": [radius], "quaternions": [rerun.Quaternion(xyzw=Z_TO_Y)]}
+            if kind == "capsule":
+                mesh = rerun.Capsules3D(translations=[[0, -half, 0]], **upright)
+            else:
+                mesh = rerun.Cylinders3D(**upright)
+        elif kind == "cone":
+            mesh = rerun.Mesh3D(**_cone(shape["half_height"], shape["radius"]))
+        elif kind == "mesh":
+            mesh = rerun.Mesh3D(vertex_positions=shape["vertices"], triangle_indices=shape["triangles"])
+        elif kind == "convex_hull":
+            mesh = rerun.Points3D(shape["points"])
         else:
             # A half-space or a height field has no extent to draw.
             return
@@ -115,3 +148,15 @@ class log:
         rotation = rerun.Quaternion(xyzw=pose["rotation"])
         self._recording.log(path, rerun.Transform3D(translation=pose["position"], rotation=rotation), static=True)
         self._recording.log(path, mesh, static=True)
+
+
+def _cone(half_height: float, radius: float) -> dict[str, Any]:
+    """A cone along y as a mesh: its tip, the center of its base, and the circle of the base."""
+    angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
+    circle = np.stack([radius * np.sin(angles), np.full(CORNERS, -half_height), radius * np.cos(angles)], axis=1)
+    corners = np.concatenate([[[0, half_height, 0], [0, -half_height, 0]], circle]).astype(np.float32)
+    first = np.arange(CORNERS) + 2
+    after = np.roll(first, -1)
+    side = np.stack([np.zeros_like(first), first, after], axis=1)
+    base = np.stack([np.ones_like(first), after, first], axis=1)
+    return {"vertex_positions": corners, "triangle_indices": np.concatenate([side, base])}

@@ -78,6 +78,10 @@ def means(rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str) -> dict
     """The mean of `value` over the rows of each pair of `x` and `y`. Rows without all three are left out.
 
     ValueError: no row has all three.
+
+    >>> from drystone.studies import means
+    >>> means([{"n": 1, "gap": 0, "stands": 1}, {"n": 1, "gap": 0, "stands": 0}], "n", "gap", "stands")
+    {(1, 0): 0.5}
     """
     cells: dict[tuple[float, float], list[float]] = {}
     for row in rows:
@@ -107,11 +111,21 @@ def table(rows: Iterable[Mapping[str, Any]], x: str, y: str, value: str) -> str:
 
 
 def color_of(share: float) -> str:
-    """The color for a share from 0 to 1."""
+    """The color for a share from 0 to 1.
+
+    >>> from drystone.studies import color_of
+    >>> color_of(0), color_of(1)
+    ('#f7fbff', '#08306b')
+    """
     return "#" + "".join(f"{round(p + (q - p) * share):02x}" for p, q in zip(LOW, HIGH, strict=True))
 
 
 def text(x: float, y: float, words: str, color: str = "#000") -> str:
-    """Text centered at a place of a picture."""
+    """Text centered at a place of a picture, as SVG.
+
+    >>> from drystone.studies import text
+    >>> text(1, 2, "n < 3")
+    '<text x="1" y="2" fill="#000">n &lt; 3</text>'
+    """
     safe = words.replace("&", "&amp;").replace("<", "&lt;")
     return f'<text x="{x:g}" y="{y:g}" fill="{color}">{safe}</text>'

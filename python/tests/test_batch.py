@@ -109,6 +109,28 @@ def test_worlds_of_several_sizes_and_settings() -> None:
     assert batch.hash()[2] == alone.hash()[0]
 
 
+def test_arrays_of_worlds_of_several_sizes_can_be_written_back() -> None:
+    scenes = [ds.Scene.find("tower", n=2), ds.Scene.find("drawbridge"), ds.Scene.find("tower", n=4)]
+    batch = ds.Batch(scenes)
+    batch.step(5)
+    before = batch.hash()
+    batch.set_state(position=batch.position, rotation=batch.rotation, linear_velocity=batch.linear_velocity)
+    batch.set_material(friction=batch.friction, mass_scale=batch.mass_scale)
+    batch.force, batch.ctrl = batch.force + 0, batch.ctrl * 1
+    batch.apply_impulse(batch.position * 0)
+    assert (batch.hash() == before).all() and np.isnan(batch.ctrl[0]).all()
+    batch.step(5)
+    same = ds.Batch(scenes)
+    same.step(10)
+    assert (batch.hash() == same.hash()).all()
+    wrong = batch.position.copy()
+    wrong[0, 1, 1] = np.nan
+    with pytest.raises(ValueError, match=r"^position\[0, 1, 1\] = nan: must be finite$"):
+        batch.set_state(position=wrong)
+    with pytest.raises(ValueError, match=r"^ctrl\[1, 1\] = nan: must be finite$"):
+        batch.ctrl = [[np.nan] * 2, [0, np.nan], [np.nan] * 2]
+
+
 def test_a_rollout_records_what_steps_give() -> None:
     scene = ds.Scene.find("drawbridge")
     ctrl = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 24, 2)).astype(np.float32)
@@ -127,6 +149,119 @@ def test_a_rollout_records_what_steps_give() -> None:
             assert np.array_equal(out["ctrl"][:, row], ctrl[:, step])
     assert len(set(out["hash"][:, -1].tolist())) == 3
     assert out["friction"].shape == (3, 4, batch.num_bodies)
+
+
+def test_a_rollout_until_stops_each_world_where_it_says() -> None:
+    scene = ds.Scene.find("drawbridge")
+    ctrl = np.random.default_rng(1).uniform(-0.5, 0.5, (3, 24, 2)).astype(np.float32)
+    names = ("position", "joint_gap", "hash")
+    whole, never, some = ds.Batch(scene, 3), ds.Batch(scene, 3), ds.Batch(scene, 4)
+    expected = whole.rollout(24, ctrl, every=5, record=names)
+    found = never.rollout(24, ctrl, every=5, record=names, until=lambda batch: np.zeros(3, bool))
+    assert all(np.array_equal(expected[name], found[name], equal_nan=True) for name in names)
+    assert (whole.hash() == never.hash()).all() and np.array_equal(whole.ctrl, never.ctrl)
+    # World 1 is not in the call, and the others stop after 10, 24 and 15 steps.
+    start = some.hash()[1]
+    out = some.rollout(
+        24, ctrl, every=5, record=names, worlds=[0, 2, 3], until=lambda batch: batch.steps >= [10, 0, 99, 15]
+    )
+    assert some.steps.tolist() == [10, 0, 24, 15] and some.hash()[1] == start
+    for row, reached in enumerate((2, 4, 3)):
+        assert np.array_equal(out["hash"][row, :reached], expected["hash"][row, :reached])
+        assert not out["hash"][row, reached:].any() and np.isnan(out["joint_gap"][row, reached:]).all()
+        assert np.array_equal(out["position"][row, :reached], expected["position"][row, :reached], equal_nan=True)
+        assert np.isnan(out["position"][row, reached:]).all()
+    # Inputs that `until` writes act from the next steps on; a world that fails stops alone.
+    batch = ds.Batch(ds.Scene.find("tower", n=2), 3)
+
+    def push(batch: ds.Batch) -> np.ndarray:
+        batch.force[1, 2] = (np.nan, 0, 0)
+        return batch.steps >= 8
+
+    with pytest.raises(ds.WorldError, match="^world 1: body 2 .*force") as caught:
+        batch.rollout(20, every=4, until=push)
+    assert batch.steps.tolist() == [8, 4, 8]
+    assert np.isfinite(caught.value.records["position"][:, :, 0, 0]).sum(axis=1).tolist() == [2, 1, 2]
+
+
+def test_a_rollout_fills_arrays_of_the_caller() -> None:
+    scene = ds.Scene.find("tower", n=2)
+    one, two = ds.Batch(scene, 2), ds.Batch(scene, 2)
+    names = ["position", "kinetic_energy", "hash"]
+    expected = one.rollout(6, every=2, record=names)
+    mine = {"position": np.zeros((2, 3, 3, 3), np.float32), "hash": np.ones((2, 3), np.uint64)}
+    found = two.rollout(6, every=2, record=names, out=mine)
+    assert found["position"] is mine["position"] and found["hash"] is mine["hash"]
+    assert all(np.array_equal(expected[name], found[name], equal_nan=True) for name in names)
+
+
+def test_a_reset_keeps_what_a_batch_listens_to() -> None:
+    scene = ds.Scene.find("tower", n=2)
+    config = ds.Config(sleep=False)
+    batch, deaf = ds.Batch(scene, 2, config=config, listen=["contacts", "impulses"]), ds.Batch(scene, 2, config=config)
+    assert (batch.hash() == deaf.hash()).all() and batch.steps.tolist() == [0, 0]
+    seen = []
+    for _ in range(3):
+        batch.step()
+        seen.append((batch.events().tolist(), batch.contact_impulse.tolist(), batch.hash().tolist()))
+        batch.step(30)
+        batch.reset()
+    assert seen[0] == seen[1] == seen[2] and len(seen[0][0]) == 4 and abs(np.array(seen[0][1])).max() > 10
+    deaf.step()
+    assert seen[0][2] == deaf.hash().tolist(), "to listen changes no bit"
+    batch.reset([1])
+    batch.set_material(worlds=[0], mass_scale=[[1, 1, 2]])
+    assert batch.mass_scale.tolist() == [[1, 1, 2], [1, 1, 1]]
+    # Loaded worlds listen as their states do, or as asked.
+    batch.step(9), deaf.step(9)
+    for states, listen, is_heard in [(batch, None, True), (deaf, None, False), (deaf, ("impulses",), True)]:
+        loaded = ds.Batch.load(states.save(), listen=listen)
+        for _ in range(2):
+            loaded.step(5)
+            assert (abs(loaded.contact_impulse).max() > 10) == is_heard
+            loaded.reset()
+
+
+def test_contact_impulses_of_bodies_are_sums_of_contacts() -> None:
+    scenes = [ds.Scene.find("tower", n=2), ds.Scene.find("pile", n=8)]
+    batch = ds.Batch(scenes, config=ds.Config(sleep=False), listen=["impulses"])
+    batch.step(90)
+    contacts, sums = batch.contacts(), np.zeros((2, batch.num_bodies, 3))
+    for world in range(2):
+        own = contacts.of(world)
+        for (a, b), impulse in zip(own.bodies, own.impulse, strict=True):
+            sums[world, a] -= impulse
+            sums[world, b] += impulse
+    sums[~batch.exists] = np.nan
+    assert batch.contact_impulse.dtype == np.float32
+    assert np.allclose(batch.contact_impulse, sums, rtol=1e-5, atol=1e-3, equal_nan=True)
+    assert np.allclose(60 * batch.contact_impulse[0, 1:3], [0, 9810, 0], atol=100)
+    with pytest.raises(ValueError, match="^contact_impulse: the batch does not listen to 'impulses'$"):
+        _ = ds.Batch(scenes[0]).contact_impulse
+
+
+def test_objects_are_shown_in_one_short_line() -> None:
+    world = ds.World()
+    ball = world.add(ds.Body.dynamic("bob").ball(0.1).at(1, 0, 0))
+    world.join(ds.Joint(ball).hinge((0, 0, 1)).at(0, 0, 0))
+    batch = ds.Batch(ds.Scene.find("tower", n=2), 3, num_threads=1)
+    batch.step()
+    rows = ds.Rows(({"key": "a", "n": 1},) * 500)
+    shown = {
+        "<World: 1 bodies, 1 joints>": world,
+        "<Body 'bob', dynamic: ball>": ds.Body.dynamic("bob").ball(0.1),
+        "<Body, fixed: no shapes>": ds.Body.fixed(),
+        "<Joint hinge: bob - world>": ds.Joint("bob").hinge((0, 0, 1)),
+        "<Scene scene: 1 bodies, 1 joints>": ds.Scene.from_world(world),
+        "<Batch of 3 worlds, up to 3 bodies each, on 1 threads>": batch,
+        "<Snapshots of 2 worlds>": batch.snapshot([0, 2]),
+        "<Contacts of 3 worlds: 6 contacts, 24 points>": batch.contacts(),
+        "<Hits of 2 rays in 3 worlds: 3 hits>": batch.ray([[0, 9, 0], [0, 9, 0]], [[0, -1, 0], [0, 1, 0]]),
+        "<Rows: 500 rows of 2 columns>": rows,
+        "<Stability: 0 worlds of 0 families under 0 settings>": ds.Stability(ds.Rows(())),
+        "Config(substeps=4)": ds.Config("fast"),
+    }
+    assert {repr(value): value for value in shown.values()} == shown
 
 
 def test_a_world_that_fails_stops_alone_as_it_was() -> None:
@@ -156,6 +291,23 @@ BATCH = ds.Batch(ds.Scene.find("drawbridge"), 8)
 B, U = BATCH.num_bodies, BATCH.num_actuators
 
 
+def roll(array: object, name: str = "position", record: str = "position") -> dict[str, np.ndarray]:
+    """A rollout of two steps into an array."""
+    return BATCH.rollout(2, record=record, out={name: array})
+
+
+def body(**keys: object) -> ds.Scene:
+    """A scene of one ball with further keys."""
+    world = ds.World()
+    world.add(ds.Body.dynamic("a").ball(1).set(**keys))
+    return ds.Scene.from_world(world)
+
+
+FLOATS = np.zeros((8, 2, B, 3), np.float32)
+READ_ONLY = FLOATS.copy()
+READ_ONLY.flags.writeable = False
+
+
 @pytest.mark.parametrize(
     ("call", "line"),
     [
@@ -178,9 +330,15 @@ B, U = BATCH.num_bodies, BATCH.num_actuators
         (lambda: BATCH.set_state(position=np.zeros((8, 1, 3))), f"position has shape (8, 1, 3): must be (8, {B}, 3)"),
         (lambda: BATCH.restore(BATCH.snapshot([0, 1])), "snapshots has 2 states: must be 1 or 8"),
         (lambda: BATCH.restore(b"", [0]), "snapshots is bytes: must be Snapshots; Snapshots.from_bytes makes them of bytes"),
+        (lambda: BATCH.ray([[0, 0, 0]], [[0, 0, 0]]), "direction[0] = [0.0, 0.0, 0.0]: must have a length"),
+        (lambda: BATCH.ray([[0, 0, 0]], [[0, 1, 0]], -1), "max_distance = -1.0: must be 0 or more"),
+        (lambda: BATCH.set_state(worlds=[1], bodies=[1], rotation=[[[0, 0, 0, 2]]]), "rotation[0, 0] = [0.0, 0.0, 0.0, 2.0]: must have unit length"),
+        (lambda: BATCH.set_material(worlds=[1], bodies=[1], friction=[[-1]]), "friction[0, 0] = -1.0: must be 0 or more"),
+        (lambda: BATCH.set_material(worlds=[1], bodies=[1], restitution=[[2]]), "restitution[0, 0] = 2.0: must be 0 to 1"),
         (lambda: BATCH.ray([[0, 0]], [[0, 0]]), "origin has shape (1, 2): must be (any, 3)"),
         (lambda: ds.Batch.load([b"drystone"]), "a saved world of a batch cannot be loaded: cut short"),
         (lambda: ds.Batch.load([BATCH.save()[0][:-1]]), None),
+        (lambda: ds.Batch(ds.Scene.find("tower"), num_threads=1025), "num_threads = 1025: must be at most 1024"),
         (lambda: ds.Batch("tower"), "scene is str: must be Scene or a list of Scene"),
         (lambda: ds.Batch([]), "scene is empty: must have at least one Scene"),
         (lambda: ds.Batch(ds.Scene.find("tower"), 0), "num_worlds = 0: must be 1 or more"),
@@ -191,6 +349,39 @@ B, U = BATCH.num_bodies, BATCH.num_actuators
         (lambda: ds.Scene.from_dict({"version": 1, "bodies": [{"kind": "stone"}]}), None),
         (lambda: ds.Config("quick"), None),
         (lambda: ds.Config(substeps=0), "substeps = 0: must be 1 to 4096"),
+        (lambda: roll(FLOATS[:, :1]), f"out['position'] has shape (8, 1, {B}, 3): must be (8, 2, {B}, 3)"),
+        (lambda: roll(np.zeros((8, 2, B, 3))), "out['position'] has dtype float64: must be float32"),
+        (lambda: roll(np.zeros((8, 2), np.int64), "hash", "hash"), "out['hash'] has dtype int64: must be uint64"),
+        (lambda: roll(np.asfortranarray(FLOATS)), "out['position'] is not contiguous: must be in C order"),
+        (lambda: roll(READ_ONLY), "out['position'] is read-only: must be writable"),
+        (lambda: roll([1.0]), "out['position'] is list: must be ndarray"),
+        (lambda: roll(FLOATS, "positon"), "out = 'positon': did you mean 'position'?"),
+        (lambda: BATCH.rollout(1, record="gravity", out={"gravity": BATCH.gravity[:, None]}), "out['gravity'] shares memory with gravity: must have memory of its own"),
+        (lambda: BATCH.rollout(1, out=[1]), "out is list: must be a dict of arrays"),
+        (lambda: BATCH.rollout(1, until=True), "until is bool: must be a function of a batch"),
+        (lambda: BATCH.rollout(1, record=5), "record = 5: must be a word or a list of words"),
+        (lambda: BATCH.step(10**30), f"n = {10**30}: must be at most 2^63 - 1"),
+        (lambda: BATCH.step(worlds=[[1], [1, 2]]), "worlds has rows of several lengths: must have one axis"),
+        (lambda: BATCH.step(dt=1j), "dt = 1j: must be a number"),
+        (lambda: BATCH.contacts().of(1.5), "k = 1.5: must be a whole number"),
+        (lambda: ds.Batch.load(5), "states is int: must be a list of bytes, one for each world"),
+        (lambda: ds.Batch.load(["a"]), "states[0] is str: must be bytes"),
+        (lambda: ds.Scene.find(3), "name is int: must be str"),
+        (lambda: ds.Scene.load(3), "path is int: must be a path"),
+        (lambda: ds.Scene.from_dict(3), "data is int: must be a dict"),
+        (lambda: ds.Scene.from_world({}), "world is dict: must be World"),
+        (lambda: ds.World().add("ball"), "body is str: must be Body"),
+        (lambda: ds.World(5), "gravity = 5: must be 3 numbers"),
+        (lambda: ds.Joint("a").hinge((0, 1)), "axis has 2 numbers: must have 3"),
+        (lambda: ds.Body.fixed().mesh([[0, 0, 0]], [[0, 1, 2]]), "triangles has 0 to 2: must be 0 to 0"),
+        (lambda: body(wept=True), None),
+        (lambda: ds.Config(3), "preset is int: must be str"),
+        (lambda: ds.Config(rules=3), "rules = 3: must be a dict"),
+        (lambda: ds.Config(rules={"clampng": 1}), "rules: clampng: did you mean 'clamping'?"),
+        (lambda: ds.Config(rules={"slip_friction": "x"}), "slip_friction = 'x': must be True or False"),
+        (lambda: ds.Config(substeps=2.5), "substeps = 2.5: must be a whole number"),
+        (lambda: ds.Config(sleep="no"), "sleep = 'no': must be True or False"),
+        (lambda: ds.Config(relax=1, method="quick"), "method: unknown variant `quick`, expected `plain` or `accelerated`"),
         (lambda: setattr(BATCH, "ctrl", np.zeros((8, U + 1))), f"ctrl has shape (8, {U + 1}): must be (8, {U})"),
     ],
 )
@@ -274,6 +465,19 @@ def test_ctrl_c_ends_a_rollout_between_two_steps() -> None:
     assert (same.hash() == batch.hash()).all() and np.array_equal(same.position, batch.position)
 
 
+def test_ctrl_c_ends_a_rollout_that_records_and_asks() -> None:
+    batch = ds.Batch(ds.Scene.find("pile", n=8), 2, config=ds.Config(sleep=False), num_threads=1)
+    for until in (None, lambda batch: np.zeros(2, bool)):
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            batch.rollout(10**6, every=1000, record="hash", until=until)
+        same = ds.Batch(ds.Scene.find("pile", n=8), 2, config=ds.Config(sleep=False))
+        for world, count in enumerate(batch.steps):
+            same.step(int(count), worlds=[world])
+        assert (same.hash() == batch.hash()).all() and np.array_equal(same.position, batch.position)
+        batch.reset()
+
+
 def test_contacts_events_rays_and_materials() -> None:
     batch = ds.Batch(ds.Scene.find("tower", n=3), 2, listen=["contacts", "impulses", "hits"], hits_above=0.1)
     batch.step()
@@ -295,6 +499,25 @@ def test_contacts_events_rays_and_materials() -> None:
     assert abs(moved[0]) < 0.01 and moved[1] > 0.1
     batch.reset()
     assert np.allclose(batch.friction, 0.5) and np.allclose(batch.gravity, (0, -9.81, 0))
+
+
+def test_a_world_is_built_of_every_shape_and_joint() -> None:
+    world = ds.World()
+    world.add(ds.Body.fixed("ground").height_field(np.zeros((3, 4)), (8, 1, 8)))
+    world.add(ds.Body.fixed("roof").mesh([[0, 0, 0], [1, 0, 0], [0, 0, 1]], [[0, 2, 1]]).at(0, -3, 0))
+    hull = world.add(ds.Body.dynamic("hull").convex_hull(np.eye(4, 3)).at(0, 2, 0).gravity_scale(0.5).damping(0.1, 0.2))
+    hammer = ds.Body.dynamic("hammer").cuboid(0.1, 0.1, 0.3).cylinder(0.5, 0.02, position=(0, -0.6, 0), material={"friction": 0.1})
+    world.add(hammer.at(3, 2, 0).set(can_sleep=False))
+    world.join(ds.Joint("hammer").generic([{}, {"locked": True}, {"locked": True}], [{"locked": True}] * 3).at(3, 2, 0))
+    world.join(ds.Joint(hull).slider((0, 1, 0)).at(0, 2, 0).spring_damper(0, 100, 5))
+    scene = ds.Scene.from_world(world)
+    data = scene.to_dict()
+    springs = [axis["spring"]["stiffness"] for axis in data["joints"][1]["linear"] if axis.get("spring")]
+    assert scene.actuators == ("joint 1: hull - world",) and springs == [100]
+    assert data["bodies"][3]["shapes"][1]["position"] == pytest.approx([0, -0.6, 0]) and not data["bodies"][3]["can_sleep"]
+    batch = ds.Batch(scene)
+    batch.step(60)
+    assert batch.position[0, 2, 1] < 2 and np.allclose(batch.position[0, 3], [3, 2, 0]) and batch.measure("finite")["finite"][0]
 
 
 def test_scenes_and_settings_are_pickled_and_read_back() -> None:

@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 from gymnasium.wrappers.vector import RecordEpisodeStatistics  # noqa: E402
 
+import drystone  # noqa: E402
 from drystone.gym import Env, VectorEnv, cart_on_drawbridge, cart_pole, drawbridge, maze  # noqa: E402
 
 MAKERS = [cart_pole, drawbridge, maze, cart_on_drawbridge]
@@ -25,9 +26,71 @@ def actions_of(make, steps: int, worlds: int) -> np.ndarray:
 def test_the_checker_of_gymnasium_passes(make) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # An environment that is made by hand has no render modes and no spec, and its observations have no bounds.
+        # An environment that is made by hand has no spec, and its observations have no bounds.
         warnings.filterwarnings("ignore", message=".*(render|spec|Box observation space).*")
         check_env(Env(make, max_steps=50), skip_render_check=True)
+
+
+def test_gymnasium_makes_environments_by_name() -> None:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*Box observation space.*")
+        env = gymnasium.make("drystone/CartPole-v0", max_steps=7)
+        envs = gymnasium.make_vec("drystone/CartPole-v0", num_envs=3, max_steps=7)
+    assert isinstance(envs.unwrapped, VectorEnv) and envs.num_envs == 3
+    first, _ = env.reset(seed=4)
+    firsts, _ = envs.reset(seed=4)
+    assert np.array_equal(first, firsts[0])
+    for step in range(7):
+        one, many = env.step(np.zeros(1, np.float32)), envs.step(np.zeros((3, 1), np.float32))
+        assert np.array_equal(one[0], many[0][0]) and one[3] == many[3][0] == (step == 6)
+    for name in ("Drawbridge", "Maze", "CartOnDrawbridge"):
+        assert gymnasium.spec(f"drystone/{name}-v0").vector_entry_point
+
+
+def test_pictures_of_environments() -> None:
+    assert cart_pole(2).render() is None and Env(cart_pole).render() is None
+    envs = cart_pole(2, render_mode="rgb_array")
+    assert envs.render_mode == "rgb_array" and envs.metadata["render_fps"] == 50
+    envs.reset(seed=1)
+    try:
+        pictures = envs.render()
+    except drystone.AdapterError as error:
+        pytest.skip(str(error))
+    assert len(pictures) == 2 and pictures[0].shape == (480, 640, 3) and pictures[0].dtype == np.uint8
+    assert Env(cart_pole, render_mode="rgb_array").render().shape == (480, 640, 3)
+
+
+def test_actions_set_ctrl_by_default() -> None:
+    batch = drystone.Batch(drystone.Scene.find("drawbridge"), 2)
+    space = gymnasium.spaces.Box(-0.5, 0.5, (2,), np.float32)
+    options = {"observe": lambda batch: batch.position[:, 1], "reward": lambda batch, actions: np.zeros(2)}
+    envs = VectorEnv(batch, action_space=space, **options)
+    envs.reset(seed=1)
+    actions = np.array([[0.1, 0.2], [0.3, 0.4]], np.float32)
+    envs.step(actions)
+    assert np.array_equal(batch.ctrl, actions)
+    for name, value, line in [
+        ("action_space", gymnasium.spaces.Box(-1, 1, (3,)), "action_space has shape (3,): must be (2,), or act be given"),
+        ("max_steps", 0, "max_steps = 0: must be 1 or more"),
+        ("frame_skip", 1.5, "frame_skip = 1.5: must be a whole number"),
+        ("render_mode", "human", "render_mode = 'human': must be one of rgb_array"),
+        ("autoreset_mode", "next", "autoreset_mode = 'next': must be one of AutoresetMode.NEXT_STEP, "),
+        ("batch", 3, "batch is int: must be Batch"),
+    ]:
+        with pytest.raises(ValueError) as caught:
+            VectorEnv(**{"batch": batch, "action_space": space, **options, name: value})
+        assert str(caught.value).startswith(line), caught.value
+    wrong = VectorEnv(batch, action_space=space, **{**options, "reward": lambda batch, actions: 0.0})
+    wrong.reset()
+    with pytest.raises(ValueError, match=r"^reward gives shape \(\): must be \(2,\)$"):
+        wrong.step(actions)
+    for seed, line in [(-1, "seed = -1: must be 0 or more"), ("a", "seed = 'a': must be a whole number"), ([1.5, 2], "seed = 1.5")]:
+        with pytest.raises(ValueError) as caught:
+            envs.reset(seed=seed)
+        assert str(caught.value).startswith(line)
+    for state in (b"", b"x", 3, envs.state()[:-5]):
+        with pytest.raises(ValueError, match="^state: must be the bytes of `state`, unchanged$"):
+            envs.set_state(state)
 
 
 @pytest.mark.parametrize("make", MAKERS)
@@ -110,6 +173,13 @@ def test_a_world_that_fails_is_terminated_and_begins_again() -> None:
         batch.force[1, 0, 0] = np.nan if envs._elapsed[1] == 5 else 0
 
     envs._act = bad
+    at_once = cart_pole(2, max_steps=50, autoreset_mode=AutoresetMode.SAME_STEP)
+    at_once.reset(seed=1)
+    at_once.batch.gravity[1] = (0, -1e30, 0)
+    _, _, terminated, _, infos = at_once.step(np.zeros((2, 1), np.float32))
+    assert terminated.tolist() == [False, True] and infos["_final_info"].tolist() == [False, True]
+    # As Gymnasium's own vector environments group it.
+    assert "gravity" in infos["final_info"]["error"][1] and infos["final_info"]["_error"].tolist() == [False, True]
     ended = 0
     for _ in range(20):
         observations, rewards, terminated, _, infos = envs.step(np.zeros((3, 1), np.float32))

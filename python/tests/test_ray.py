@@ -140,16 +140,19 @@ def test_a_fleet_whose_actor_dies_has_the_hashes_of_one_batch(cluster) -> None:
     assert (batch.hash() == fleet.hash()).all() and fleet.rebuilt >= 3
     assert np.array_equal(batch.measure("overlap_max")["overlap_max"], fleet.measure("overlap_max")["overlap_max"])
     assert fleet.save() == batch.save()
-    with pytest.raises(ValueError, match="record = 'positon'"):
+    assert repr(fleet) == "<Fleet of 7 worlds on 2 actors>" and len(fleet) == 7
+    with pytest.raises(ValueError, match="^record = 'positon': did you mean 'position'\\?$"):
         fleet.rollout(1, record=["positon"])
     with pytest.raises(ValueError, match="ctrl has shape"):
         fleet.rollout(1, np.zeros((3, 1, 2)))
     # Where some worlds fail the others go on, also of an actor that dies afterwards.
     bad = np.zeros((7, 1, 2), np.float32)
-    bad[2] = 1e30
+    bad[[2, 5]] = 1e30
     for worlds in (batch, fleet):
-        with pytest.raises(ds.WorldError, match="world 2"):
+        with pytest.raises(ds.WorldError, match=r"^world 2: [^\n]* \(and 1 more\)$") as caught:
             worlds.rollout(5, bad)
+        # Numbers of the fleet, not of the actor.
+        assert caught.value.worlds.tolist() == [2, 5] and len(caught.value.records["position"]) == 7
     pid = ray.get(fleet._shares[0].actor.__ray_call__.remote(lambda self: os.getpid()))
     os.kill(pid, signal.SIGKILL)
     assert (batch.hash() == fleet.hash()).all()
