@@ -5,6 +5,7 @@
 //! | find a scene by name | [`Scene::find`], [`CATALOGUE`] |
 //! | draw a hard case with a known law | [`Family`] |
 //! | let bodies come and leave | [`Spawners`] |
+//! | drive a character or a vehicle by input | [`Driver`] |
 //! | record a run and replay it | [`Recorder`], [`Replay`] |
 //! | read and write scene files | `SceneFile`, `load`, `schema` |
 //!
@@ -16,6 +17,7 @@
 #![warn(missing_docs)]
 
 mod catalogue;
+mod driver;
 #[cfg(feature = "serde")]
 mod file;
 mod find;
@@ -25,6 +27,7 @@ mod spawner;
 mod spawners;
 
 pub use catalogue::{CATALOGUE, Entry, Family, Law, Member, Parameter};
+pub use driver::Driver;
 #[cfg(feature = "serde")]
 pub use file::{
     AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile,

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::driver::Driver;
 use super::spawner::{Leaves, Spawner};
 use drystone::stages::error::ensure;
 use drystone::{Result, World};
@@ -44,6 +45,8 @@ pub struct Scene {
     pub spawners: Vec<Spawner>,
     /// Bodies of the world that leave while the scene runs, by index.
     pub leaving: Vec<(usize, Leaves)>,
+    /// Drives a body of the scene by input, or `None`. A scene file does not keep it.
+    pub driver: Option<Driver>,
 }
 
 /// Bodies that stand or fall together.
@@ -77,6 +80,7 @@ impl Scene {
             groups: Vec::new(),
             spawners: Vec::new(),
             leaving: Vec::new(),
+            driver: None,
         }
     }
 

@@ -3,6 +3,7 @@
 use glam::camera::rh::proj::directx;
 use glam::camera::rh::view::look_at_mat4;
 use glam::{Mat4, Quat, Vec2, Vec3};
+use std::f32::consts::{PI, TAU};
 
 use crate::bounds::Bounds;
 
@@ -49,6 +50,18 @@ impl Camera {
         }
         camera.distance *= 1.06;
         camera
+    }
+
+    /// A camera at `distance` behind a body at `target`, which looks `ahead`.
+    pub fn behind(target: Vec3, ahead: Vec3, up: Vec3, distance: f32) -> Self {
+        let ahead = Quat::from_rotation_arc(up, Vec3::Y) * ahead;
+        Self { target, distance, yaw: (-ahead.x).atan2(-ahead.z), pitch: 0.3, up }
+    }
+
+    /// The camera `other`, with target and yaw only a share of the way from this one to it.
+    pub fn towards(&self, other: &Self, share: f32) -> Self {
+        let turn = (other.yaw - self.yaw + PI).rem_euclid(TAU) - PI;
+        Self { target: self.target.lerp(other.target, share), yaw: self.yaw + share * turn, ..*other }
     }
 
     /// Unit vectors to the right, up and back (towards the eye).

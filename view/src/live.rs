@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use web_time::Instant;
 
 use crate::bounds::{Bounds, FAR};
+use crate::camera::Camera;
 use crate::colors::ColorBy;
 use crate::overlay::Overlay;
 use crate::poses::poses;
@@ -15,7 +16,7 @@ use drystone::queries::Filter;
 use drystone::{
     Backend, Body, BodyKind, Cpu, JointHandle, Result, Shape, Simulation, Snapshot, SolverConfig, StepStats,
 };
-use drystone_scenes::{Replay, Scene, Spawners};
+use drystone_scenes::{Driver, Replay, Scene, Spawners};
 
 /// Rate at which a pulled body approaches the pointer (1/s). It is soft for joints of any stiffness.
 const PULL: f32 = 10.0;
@@ -23,6 +24,10 @@ const PULL: f32 = 10.0;
 const PATIENCE: Duration = Duration::from_millis(30);
 /// Speed of a thrown cube, in radii of the scene per second (1/s).
 const THROW: f32 = 2.0;
+/// Distance of the camera from a driven body, in radii of the body, and the share by which it comes nearer to its place
+/// behind the body in each step.
+const BEHIND: f32 = 8.0;
+const EASE: f32 = 0.15;
 
 /// A scene or a recording that runs interactively. The user can pull bodies, throw cubes, keep a state and go back to
 /// it.
@@ -61,6 +66,12 @@ pub struct Live {
     pub(crate) replay: Option<Replay>,
     /// The place of the pointer.
     pub(crate) pointer: Option<Pointer>,
+    /// The driver, if the scene has one.
+    pub driver: Option<Driver>,
+    /// The camera behind the driven body, from the first input on.
+    pub(crate) chase: Option<Camera>,
+    /// Whether each arrow key is down: up, down, left, right.
+    pub(crate) held: [bool; 4],
     /// Bounds of the scene at its start.
     pub(crate) built: Bounds,
     /// Bounds of the bodies and of the last part of their paths.
@@ -100,8 +111,8 @@ pub fn scene_of(replay: &Replay, simulation: &Simulation) -> Scene {
     scene
 }
 
-/// A state to go back to: of the simulation and the spawners, with its step.
-pub(crate) type Kept = (Snapshot, Spawners, u32);
+/// A state to go back to: of the simulation, the spawners and the driver, with its step.
+pub(crate) type Kept = (Snapshot, Spawners, Option<Driver>, u32);
 
 impl Live {
     /// A scene on the requested backend; `exact` requests a GPU with the bits of the reference.
@@ -160,6 +171,9 @@ impl Live {
             kept: None,
             replay: None,
             pointer: None,
+            driver: scene.driver,
+            chase: None,
+            held: [false; 4],
             light_end: 0.0,
             scene,
         }
@@ -214,6 +228,7 @@ impl Live {
         let backend = self.simulation.set_backend(Box::new(Cpu::new()));
         self.simulation = Simulation::with(self.scene.world.clone(), config, backend)?;
         self.spawners = Spawners::new(&self.scene);
+        self.driver = self.scene.driver;
         (self.steps, self.owed, self.grabbed, self.stats) = (0, 0.0, None, StepStats::default());
         self.look_anew();
         Ok(())
@@ -221,15 +236,16 @@ impl Live {
 
     /// Keeps the present state, to go back to it.
     pub fn keep(&mut self) {
-        self.kept = Some((self.simulation.snapshot(), self.spawners.clone(), self.steps));
+        self.kept = Some((self.simulation.snapshot(), self.spawners.clone(), self.driver, self.steps));
     }
 
     /// Goes back to the kept state.
     pub fn go_back(&mut self) {
-        if let Some((snapshot, spawners, steps)) = self.kept.as_ref().filter(|_| self.replay.is_none()) {
+        if let Some((snapshot, spawners, driver, steps)) = self.kept.as_ref().filter(|_| self.replay.is_none()) {
             self.simulation.restore(snapshot);
             self.spawners.clone_from(spawners);
-            (self.steps, self.owed, self.grabbed) = (*steps, 0.0, None);
+            (self.driver, self.steps, self.owed, self.grabbed) = (*driver, *steps, 0.0, None);
+            self.steer_by_keys(false);
             self.look_anew();
         }
     }
@@ -247,7 +263,7 @@ impl Live {
 
     /// Discards the paths of the bodies. The camera then frames them at their present places.
     pub fn look_anew(&mut self) {
-        self.way = Bounds::EMPTY;
+        (self.way, self.chase) = (Bounds::EMPTY, None);
         self.look();
     }
 
@@ -256,6 +272,36 @@ impl Live {
         let (world, radius) = (&self.simulation.world, self.built.radius());
         let now = Bounds::at(world, &poses(world), radius);
         self.way = self.way.near(now, FAR * radius);
+        self.chase = self.driven().filter(|_| self.driver.is_some_and(|driver| driver.is_driving())).map(|body| {
+            let bounds = body.colliders.iter().map(|collider| collider.bounds(Vec3::ZERO, Quat::IDENTITY));
+            let whole = bounds.fold(Bounds::EMPTY, |all, (low, high)| all.join(Bounds { low, high }));
+            let ahead = body.rotation * Vec3::X;
+            let behind = Camera::behind(body.position, ahead, self.up(), BEHIND * whole.radius());
+            self.chase.map_or(behind, |camera| camera.towards(&behind, EASE))
+        });
+    }
+
+    /// Steers by the arrow keys that are down.
+    pub(crate) fn steer_by_keys(&mut self, jump: bool) {
+        let [up, down, left, right] = self.held.map(f32::from);
+        if let Some(driver) = &mut self.driver {
+            driver.steer(up - down, right - left, jump);
+        }
+    }
+
+    /// The driven body.
+    pub fn driven(&self) -> Option<&Body> {
+        self.driver.and_then(|driver| self.simulation.world.body(driver.body()))
+    }
+
+    /// The point that the camera follows while a person drives (m).
+    pub fn followed(&self) -> Option<Vec3> {
+        self.chase.map(|camera| camera.target)
+    }
+
+    /// The direction against gravity.
+    pub(crate) fn up(&self) -> Vec3 {
+        -self.scene.world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y)
     }
 
     /// Throws a cube from the eye towards the pointer.
@@ -334,7 +380,7 @@ impl Live {
         let stats = match &mut self.replay {
             Some(replay) => replay.step_async(&mut self.simulation).await?,
             None => {
-                self.before_step();
+                self.before_step()?;
                 Some(self.simulation.step_async(self.scene.dt).await?)
             }
         };
@@ -350,8 +396,11 @@ impl Live {
         }
     }
 
-    /// Runs the spawners and pulls the grabbed body, before a step that the caller makes.
-    pub fn before_step(&mut self) {
+    /// Runs the spawners, pulls the grabbed body and moves the driven one, before a step that the caller makes.
+    ///
+    /// # Errors
+    /// Those of [`Driver::before_step`].
+    pub fn before_step(&mut self) -> Result<()> {
         let dt = self.scene.dt;
         self.spawners.before_step(&mut self.simulation.world, dt);
         let world = &mut self.simulation.world;
@@ -365,6 +414,7 @@ impl Live {
             }
             self.simulation.wake(grabbed.body);
         }
+        self.driver.as_mut().map_or(Ok(()), |driver| driver.before_step(&mut self.simulation, dt))
     }
 
     /// Records a completed step.

@@ -1,7 +1,5 @@
 //! Pictures, keys and pointer of a live scene.
 
-use glam::Vec3;
-
 use crate::bounds::Bounds;
 use crate::camera::Camera;
 use crate::colors::Rgba;
@@ -28,8 +26,11 @@ impl Show for Live {
     }
 
     fn camera(&self, aspect: f32) -> Camera {
-        let up = -self.scene.world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
-        Camera::framing(&self.bounds(), up, 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
+        if let Some(camera) = self.chase {
+            // A picture that is higher than wide shows as much from side to side.
+            return Camera { distance: camera.distance / aspect.min(1.0), ..camera };
+        }
+        Camera::framing(&self.bounds(), self.up(), 30.0_f32.to_radians(), 25.0_f32.to_radians(), aspect)
     }
 
     fn colors(&mut self) -> Vec<Rgba> {
@@ -56,6 +57,11 @@ impl Show for Live {
     }
 
     fn key(&mut self, key: Key, down: bool) {
+        let arrows = [Key::Up, Key::Down, Key::Left, Key::Right];
+        if let Some(arrow) = arrows.iter().position(|a| *a == key) {
+            self.held[arrow] = down;
+        }
+        self.steer_by_keys(down && key == Key::Character('j'));
         if !down {
             return;
         }

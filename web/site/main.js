@@ -7,7 +7,7 @@ import * as numbers from "./numbers.js";
 import * as panel from "./panel.js";
 import { keys, listen } from "./pointer.js";
 import {
-  act, assignments, canvases, changes, chosen, enqueue, file, frame, game, hasWebGPU, loop, open, openPicture, pause, paused, pointer, refuse, restart, say,
+  act, assignments, canvases, changes, chosen, drives, enqueue, file, frame, game, hasWebGPU, loop, open, openPicture, pause, paused, pointer, refuse, restart, say,
   setPace, shows, state, step, stepOnce, tilts, tried,
 } from "./run.js";
 
@@ -115,7 +115,8 @@ function shortcut(event) {
   if (key === " " && target.matches("button, summary, input")) return;
   const at = target === element("picture") && element("picture").matches(":focus-visible") ? [0, 0] : pointer;
   const calls = {
-    " ": () => pause(!paused),
+    " ": () => drives !== "character" && pause(!paused),
+    p: () => pause(!paused),
     n: () => !game && stepOnce(),
     r: restart,
     f: act.whole,

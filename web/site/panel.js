@@ -3,7 +3,7 @@ import { catalogue, conform, settings } from "./drystone_web.js";
 import * as device from "./device.js";
 import * as fields from "./fields.js";
 import * as numbers from "./numbers.js";
-import { changes, chosen, difference, file, game, open, say, setSettings, shows, tried } from "./run.js";
+import { changes, chosen, difference, drives, file, game, open, say, setSettings, shows, tried } from "./run.js";
 
 const element = (id) => document.getElementById(id);
 /// Settings above the fold.
@@ -40,7 +40,8 @@ function told() {
 
 export function panel() {
   const isMaze = game !== null;
-  for (const part of document.querySelectorAll("[data-of]")) part.hidden = (part.dataset.of === "maze") !== isMaze;
+  const shown = isMaze ? ["maze"] : ["scenes", ...(drives ? ["driven", drives] : ["undriven"])];
+  for (const part of document.querySelectorAll("[data-of]")) part.hidden = !shown.includes(part.dataset.of);
   element("tab-gallery").setAttribute("aria-pressed", String(!isMaze));
   element("tab-maze").setAttribute("aria-pressed", String(isMaze));
   element("step").hidden = isMaze;
@@ -162,7 +163,8 @@ export function gallery() {
       card.append(image, strong, small);
       card.addEventListener("click", () => {
         element("gallery-dialog").close();
-        choose(name);
+        // Keys then drive the scene, and do not press the button that opened the gallery.
+        choose(name).then(() => drives && element("picture").focus({ preventScroll: true }));
       });
       const item = document.createElement("li");
       item.append(card);

@@ -89,7 +89,7 @@ export function keys(canvas, act) {
   canvas.addEventListener("keydown", async (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const arrow = arrows[event.key];
-    if (arrow && act.tilts()) return;
+    if (arrow && act.steers()) return;
     if (arrow && held) {
       held = [held[0] + TURN * arrow[0], held[1] + TURN * arrow[1]].map((x) => Math.max(-1, Math.min(1, x)));
       act.drag(held);

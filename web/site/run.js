@@ -3,6 +3,7 @@ import { Maze, Picture, Show, first_difference } from "./drystone_web.js";
 import * as link from "./link.js";
 import * as maze from "./maze.js";
 import * as numbers from "./numbers.js";
+import { Steering } from "./steering.js";
 
 const element = (id) => document.getElementById(id);
 /// Largest number of steps between two pictures, and the time after which no further step begins (ms).
@@ -33,6 +34,9 @@ const rates = { steps: 0, pictures: 0 };
 /// Wanted tilts of the board.
 export const tilts = new maze.Tilts();
 tilts.listens = () => game !== null;
+/// What a person can drive in the run: "character", "vehicle" or null.
+export let drives = null;
+const steering = new Steering(() => drives);
 
 // Calls of the solver can wait for a device and must not overlap: each begins when the one before has ended.
 let line = Promise.resolve();
@@ -58,7 +62,7 @@ export function say(text, isBad = false) {
 export function refuse(error) {
   if (error instanceof WebAssembly.RuntimeError) {
     pause(true);
-    [shows, game] = [[], null];
+    [shows, game, drives] = [[], null, null];
     say("The solver stopped because of a defect. Load the page again to continue.", true);
     throw error;
   }
@@ -110,6 +114,7 @@ function replace(made, opened, next, nextFile) {
   [...shows, ...(game ? [game] : [])].forEach((old) => old.free());
   [shows, game, chosen, file] = [made, opened, next, nextFile];
   [owed, last, difference, tilts.pressed] = [0, null, null, null];
+  drives = shows[0]?.drives() ?? null;
   const isTwo = shows.length === 2;
   element("beside").hidden = !isTwo;
   document.querySelectorAll("figcaption").forEach((caption) => (caption.hidden = !isTwo));
@@ -244,7 +249,11 @@ async function steps(seconds) {
 
 /// One step of the whole run. It records the first number that differs.
 export async function step() {
-  for (const show of shows) await show.step();
+  const input = steering.next();
+  for (const show of shows) {
+    show.steer(...input);
+    await show.step();
+  }
   if (shows.length === 2 && difference === null) {
     const found = first_difference(shows[0], shows[1]);
     if (found !== undefined) {
@@ -350,14 +359,18 @@ export const act = {
   pan: (by) => turned((show) => show.pan(...by)),
   zoom: (notches) => turned((show) => show.zoom(notches)),
   whole: () => tried(() => (framed = null)),
-  grab: (at) => (game ? Promise.resolve(false) : touched((show) => show.grab(...at, aspect()))),
+  grab: async (at) => {
+    const isTaken = game === null && (await both((show) => show.grab(...at, aspect())));
+    if (isTaken) framed = "by hand";
+    return isTaken;
+  },
   drag: (at) => both((show) => show.drag(...at, aspect())),
   release: () => both((show) => show.release()),
   throw: (at) => touched((show) => show.throw_cube(...at, aspect())),
   delete: (at) => touched((show) => show.delete_body(...at, aspect())),
   point: (at) => (pointer = at),
-  /// Whether arrow keys tilt a board.
-  tilts: () => game !== null,
+  /// Whether arrow keys tilt a board or drive.
+  steers: () => game !== null || drives !== null,
   press: (at) => {
     tilts.pressed = game ? at : null;
     return game !== null;

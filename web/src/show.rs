@@ -6,7 +6,7 @@ use drystone::{Cpu, Error, Result};
 use drystone_conform::compare::BodyDifference;
 use drystone_scenes::{Recorder, RecordingIntervals, Replay, SceneFile};
 use drystone_view::{Camera, ColorBy, Live, Overlay, Pointer, Show as _};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use serde_json::{Map, Value, json};
 use wasm_bindgen::prelude::*;
 
@@ -62,14 +62,19 @@ impl Show {
     }
 
     async fn make_step(&mut self) -> Result<()> {
+        let before = self.live.followed();
         match &mut self.recorder {
             Some(recorder) => {
                 let dt = self.live.scene().dt;
-                self.live.before_step();
+                self.live.before_step()?;
                 let stats = recorder.step_async(&mut self.live.simulation, dt).await?;
                 self.live.after_step(stats);
             }
             None => self.live.step_async().await?,
+        }
+        // A view that the user turned goes along with the driven body too.
+        if let (Some(before), Some(after)) = (before, self.live.followed()) {
+            self.camera.target += after - before;
         }
         self.recorder.take_if(|recorder| recorder.so_far().len() > LONGEST);
         if let Some(fault) = &self.live.stats.fault {
@@ -89,6 +94,10 @@ impl Show {
             self.live.simulation.manifolds().fold((0, 0), |(all, points), m| (all + 1, points + m.points().len()));
         let Live { simulation, stats, stage_ms, steps, .. } = &self.live;
         let Camera { target, distance, yaw, pitch, .. } = self.camera;
+        let driven = self.live.driven().map(|body| {
+            let ahead = body.rotation * Vec3::X;
+            json!({"at": body.position.to_array(), "ahead": ahead.to_array()})
+        });
         let stages: Map<String, Value> = stats
             .times
             .stages()
@@ -112,6 +121,7 @@ impl Show {
             "kinetic_energy": simulation.world.kinetic_energy(),
             "stage_ms": stages,
             "fault": self.fault,
+            "driven": driven,
             "camera": {"target": target.to_array(), "distance": distance, "yaw": yaw, "pitch": pitch},
         })
     }
@@ -138,6 +148,18 @@ impl Show {
     pub async fn use_backend(&mut self, name: String) -> std::result::Result<(), JsError> {
         self.live.simulation.set_backend(thrown(choice::backend(&name).await)?);
         Ok(())
+    }
+
+    /// What a person drives: `character`, `vehicle`, or nothing.
+    pub fn drives(&self) -> Option<String> {
+        self.live.driver.map(|driver| if driver.can_jump() { "character" } else { "vehicle" }.into())
+    }
+
+    /// Steers from the next step on: forward and to the right, each -1 to 1. A jump counts once.
+    pub fn steer(&mut self, forward: f32, right: f32, jump: bool) {
+        if let Some(driver) = &mut self.live.driver {
+            driver.steer(forward, right, jump);
+        }
     }
 
     /// Makes one step.

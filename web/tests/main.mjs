@@ -6,6 +6,7 @@ import { Browser } from "./browser.mjs";
 import { Checks } from "./checks.mjs";
 import { serve } from "./serve.mjs";
 import * as colors from "./groups/colors.mjs";
+import * as drive from "./groups/drive.mjs";
 import * as files from "./groups/files.mjs";
 import * as gallery from "./groups/gallery.mjs";
 import * as hashes from "./groups/hashes.mjs";
@@ -20,7 +21,7 @@ import * as phone from "./groups/phone.mjs";
 import * as webgpu from "./groups/webgpu.mjs";
 import * as without from "./groups/without.mjs";
 
-const GROUPS = [node, loading, hashes, webgpu, without, lost, gallery, maze, files, links, phone, keyboard, colors, hidden];
+const GROUPS = [node, loading, hashes, webgpu, without, lost, gallery, maze, drive, files, links, phone, keyboard, colors, hidden];
 const root = resolve(import.meta.dirname, "../..");
 
 /// Runs a group, and with it a mistake on purpose if one is given. Whatever the console of a page says is a failure.

@@ -16,6 +16,9 @@ impl Panel for Live {
         controls(self, ui);
         ui.separator();
         settings(self, ui);
+        if let Some(driver) = self.driver {
+            ui.label(if driver.can_jump() { "arrows walk, j jumps" } else { "arrows drive" });
+        }
         keys(ui);
     }
 }

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::common::floor;
+use crate::driver::Driver;
 use crate::scene::Scene;
 use drystone::stages::math::rotation::about;
 use drystone::{Body, Shape, World};
@@ -37,8 +38,8 @@ pub(super) fn course(spin: f32) -> Scene {
     }
     slope(&mut world, 50.0, Vec3::new(20.0, 0.0, 0.0), 3.0);
     let capsule = Shape::capsule(0.6, 0.3);
-    world.add(Body::kinematic().named("character").shape(capsule).position(0.0, 0.906, 0.0));
-    Scene::new("course", world, 900)
+    let character = world.insert(Body::kinematic().named("character").shape(capsule).position(0.0, 0.906, 0.0));
+    Scene { driver: Some(Driver::character(character)), ..Scene::new("course", world, 900) }
 }
 
 /// A slope with its upper face from `begin` on, with this length (m) and rise in degrees along x.
