@@ -737,3 +737,30 @@ fn stand_still(
         slow_down(world, problem, members, motions, 0.0);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::Shape;
+
+    /// Two balls of 1 kg part at 1 m/s each. A quarter of their energy leaves half of their speeds, relative to the
+    /// motion of both that the momentum of the start has.
+    #[test]
+    fn balls_that_part_keep_a_quarter_of_their_energy_and_the_momentum_of_the_start() {
+        let mut world = World::new();
+        for x in [-1.0, 1.0] {
+            world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(1.0).position(x, 0.0, 0.0));
+        }
+        for drift in [None, Some(3.0_f64)] {
+            let row = |x: f32| BodyRow { v: [x, 0.0, 0.0], ..BodyRow::AT_REST };
+            let mut problem = StepProblem { bodies: vec![row(-1.0), row(1.0)], ..StepProblem::default() };
+            let from_start =
+                drift.map(|drift| Momenta { linear: DVec3::X * 2.0 * drift, ..now(&world, &problem, 0..2) });
+            assert!(brake(&world, &mut problem, 0..2, [0.75, 1.0], from_start.as_ref()));
+            for (row, relative) in problem.bodies.iter().zip([-0.5, 0.5]) {
+                let expected = Vec3::X * (drift.unwrap_or(0.0) as f32 + relative);
+                assert!(Vec3::from(row.v).distance(expected) < 1e-5, "{:?}, not {expected} m/s", row.v);
+            }
+        }
+    }
+}

@@ -107,3 +107,16 @@ pub fn solve_joint<L: Lane>(
     }
     apply_impulse(Rules::default(), pair, anchors[0], anchors[1], change);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nothing moves along z. 2^-19 is added to the half of the block, whose trace of 2 is scaled to 1.
+    #[test]
+    fn a_block_that_is_hard_along_one_axis_is_solved_across_it() {
+        let solved = solve_block(vec3(1.0_f64, 0.0, 0.0), vec3(0.0, 1.0, 0.0), Vec3::default(), vec3(1.0, -3.0, 0.0));
+        assert!((solved.x - 1.0).abs() < 1e-5 && (solved.y + 3.0).abs() < 3e-5, "{solved:?}");
+        assert_eq!(solved.z, 0.0);
+    }
+}

@@ -401,6 +401,28 @@ fn group_name(colors: &Range<u32>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::problem::{BodyRow, InertiaRow, MassRow};
+
+    /// Only the color of the spins differs.
+    #[test]
+    fn a_plan_does_not_last_where_the_first_spin_comes() {
+        let problem = |spins: usize| {
+            let mut problem = StepProblem {
+                bodies: vec![BodyRow::AT_REST; 2],
+                masses: vec![MassRow::default(); 2],
+                inertias: vec![InertiaRow::default(); spins],
+                ..StepProblem::default()
+            };
+            problem.sweep_in_order_of_rows();
+            problem
+        };
+        let [without, with] = [0, 1].map(problem);
+        assert_eq!(without.blocks, with.blocks);
+        let plan = |problem: &StepProblem| StepPlan::new(&SolverConfig::default(), problem);
+        assert_ne!(plan(&without), plan(&with));
+        assert!(PlanKey::of(&without).is_of(&without) && PlanKey::of(&with).is_of(&with));
+        assert!(!PlanKey::of(&without).is_of(&with) && !PlanKey::of(&with).is_of(&without));
+    }
 
     #[test]
     fn small_neighbouring_colors_share_a_pass_and_large_ones_do_not() {

@@ -3,13 +3,16 @@
 
 use drystone::config::FrictionRule;
 use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
+use drystone::stages::kernels::axis::axis_motion;
 use drystone::stages::kernels::contact::{
     current_separation, normal_movement, restitute_contact, solve_contact, warm_start,
 };
 use drystone::stages::kernels::friction::{solve_friction, solve_twist};
 use drystone::stages::kernels::joint::joint_column;
 use drystone::stages::kernels::pair::{relative_movement, relative_velocity};
-use drystone::stages::kernels::{Body, Contact, Impulse, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3};
+use drystone::stages::kernels::{
+    Axis, Body, Contact, Impulse, Joint, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3,
+};
 use drystone::stages::math::{Quat, Vec3 as LaneVec3, vec3};
 use drystone::stages::problem::ContactRow;
 use drystone::stages::problem::effective::{EffectiveMass, InverseMass};
@@ -437,8 +440,7 @@ fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
     assert!((impulse - 0.2 - change).abs() < 1e-14 && (u - (change / mass - 3.0)).abs() < 1e-13, "{u} {impulse}");
     // The impulse of a sweep may shrink the sum, down to nothing and no further; or each counts by itself.
     let pushed = |accumulated| {
-        let mut rules = Rules { accumulated, ..Rules::default() };
-        rules.biased = false;
+        let rules = Rules { accumulated, bounces: true, ..Rules::default() };
         let parting = StepParams { movable: hard(0.0, 0.0), ..params };
         let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
         pair.b.v = lane(case.normal);
@@ -511,5 +513,17 @@ fn anchors_move_as_far_as_their_bodies_moved_and_turned() {
         let arm = case.r[moved];
         let expected = (dp + DQuat::from_scaled_axis(turn) * arm - arm) * sign;
         assert!(DVec3::new(way.x, way.y, way.z).distance(expected) < 1e-14, "body {moved}");
+    }
+}
+
+#[test]
+fn the_axis_of_a_joint_turns_with_its_second_body() {
+    let case = case();
+    let turn = DVec3::new(0.4, 0.7, -0.2);
+    for (moved, turned) in [(0, DQuat::IDENTITY), (1, DQuat::from_scaled_axis(turn))] {
+        let pair = case.pair(moved, DVec3::ZERO, turn);
+        let axis = Axis { direction: lane(case.normal), ..Axis::default() };
+        let about = axis_motion(&pair, &Joint::default(), &axis).about_a;
+        assert!(DVec3::new(about.x, about.y, about.z).distance(turned * case.normal) < 1e-14, "body {moved}");
     }
 }

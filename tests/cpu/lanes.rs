@@ -1,7 +1,7 @@
 //! Sixteen lanes and all threads against one constraint at a time: the same bits.
 
 use crate::common::settings::set;
-use drystone::{Backend, Cpu, Reference, SolverConfig};
+use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig};
 use drystone_conform::compare::{Comparison, compare};
 use drystone_scenes::Scene;
 
@@ -105,6 +105,24 @@ fn friction_per_manifold_without_friction_has_the_same_bits() {
         same_bits(&against_reference(&backend, "slide:mu=0", &["friction_at=manifold"], 20, 1));
         same_bits(&against_reference(&backend, "pile:n=50", &["friction_at=manifold", "friction=none"], 40, 2));
         same_bits(&against_reference(&backend, "slide:mu=0", &["friction_at=manifold", "friction_sweeps=all"], 20, 1));
+    }
+}
+
+/// No pass over a scene without restitution keeps the largest impulses.
+#[test]
+fn largest_impulses_that_no_pass_keeps_stay_in_the_rows() {
+    let scene = Scene::find_spec("pile:n=50").unwrap();
+    let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), best()).unwrap();
+    for _ in 0..40 {
+        simulation.step(scene.dt).unwrap();
+    }
+    let (mut problem, plan) = simulation.next_problem(scene.dt).unwrap();
+    assert!(problem.swept_contacts().count() > 0 && !plan.passes.iter().any(|pass| pass.kernel.keeps_peaks()));
+    problem.impulses.iter_mut().for_each(|impulse| impulse.peak = 0.5);
+    for backend in each() {
+        let mut solved = problem.clone();
+        backend().run(&mut solved, &plan.passes).unwrap();
+        assert!(solved.impulses.iter().all(|impulse| impulse.peak == 0.5), "{}", backend().adapter());
     }
 }
 

@@ -313,6 +313,32 @@ mod tests {
         assert_eq!(partition.of(large + 3, large + 2), 0, "what stands still makes no island");
     }
 
+    /// A floor in the first block, under a ball of that block and under a large island of the second.
+    #[test]
+    fn a_large_island_on_the_floor_of_another_block_keeps_its_constraints() {
+        let bodies = LARGE + 4;
+        let mut problem = problem(bodies as usize, [(0, 1), (0, 2)].into_iter().chain((3..bodies).map(|i| (i - 1, i))));
+        problem.masses[0].inv_mass = 0.0;
+        let contacts = problem.contacts.len() as u32;
+        let end = contacts + bodies;
+        problem.colors = vec![0, 1, contacts, contacts + 2, end, end, end, end, end, end, end];
+        let whole = problem.blocks[0];
+        problem.blocks = Vec::from([0, 1].map(|i| Block {
+            contacts: [i, i + 1],
+            struck: i + 1,
+            jamming: i + 1,
+            joints: [2; 2],
+            direct: 2,
+            bodies: 2 + i,
+            inertias: 4 + i,
+            systems: 6 + i,
+            turning: 8 + i,
+            ..whole
+        }));
+        let partition = partition(&problem);
+        assert_eq!((partition.count, partition.of(0, 1), partition.of(0, 2)), (4, 0, 2));
+    }
+
     #[test]
     fn a_driven_body_makes_an_island_of_what_touches_it() {
         let many = PART;
