@@ -232,3 +232,19 @@ pub fn integrate_gyroscopic<S: Scalar>(
     }
     body.w += turn;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The square of 1e20 is no number of 32 bits.
+    #[test]
+    fn a_spin_whose_energy_is_no_number_stays() {
+        let axes = [vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)];
+        let (principal, inv_principal) = (vec3(0.25_f32, 0.5, 1.0), vec3(4.0_f32, 2.0, 1.0));
+        let inertia = Inertia { principal, inv_principal, ..Inertia::default() };
+        let turn = |spin: Vec3<f32>| fast_turn(false, &inertia, 0.01, 1.0, axes, spin, spin);
+        assert_eq!(turn(vec3(1e20, 2e20, 3e20)), Vec3::default());
+        assert_ne!(turn(vec3(10.0, 20.0, 30.0)), Vec3::default());
+    }
+}

@@ -26,6 +26,7 @@ tests! {
         a_body_that_may_not_touch_wakes_no_sleeper,
         a_hook_that_panics_leaves_the_world_as_it_was,
         a_loaded_run_goes_on_with_the_same_bits,
+        a_hook_takes_the_friction_from_a_contact_at_rest_at_once,
         a_material_out_of_range_is_an_error_that_names_the_bodies,
         calls_come_in_one_order,
         contacts_have_their_own_materials_without_hooks,
@@ -271,6 +272,23 @@ fn lanes_have_the_bits_of_the_reference_with_hooks() {
 
 fn a_gpu_has_the_bits_of_the_reference_with_hooks() {
     assert_eq!(all_bits(&hooked_run(|| Box::new(gpu::exact()), 60)), all_bits(&hooked_run(reference, 60)));
+}
+
+/// Friction holds a cube that a force pulls with 0.3 m g, so that its contact is reused.
+/// Without friction it goes in the very next step.
+fn a_hook_takes_the_friction_from_a_contact_at_rest_at_once() {
+    let mut world = World::new();
+    world.add(floor());
+    let body = world.add(cube().position(0.0, 0.5, 0.0));
+    world.bodies[body].force = Vec3::X * (0.3 * G * world.bodies[body].mass.mass);
+    let mut simulation = simulation(world, reference);
+    steps(&mut simulation, 10);
+    assert!(simulation.world.bodies[body].linear_velocity.length() < 1e-3);
+    simulation.set_hooks(modifying(|_, contact| contact.friction = 0.0));
+    steps(&mut simulation, 1);
+    let speed = simulation.world.bodies[body].linear_velocity.x;
+    let exact = 0.3 * G * DT;
+    assert!((speed - exact).abs() < 0.03 * exact, "{speed} m/s, not {exact}");
 }
 
 fn a_loaded_run_goes_on_with_the_same_bits() {

@@ -19,6 +19,7 @@ tests! {
         lanes_have_the_bits_of_the_reference_with_locked_axes,
         free_axes_keep_their_momentum,
         axes_that_a_caller_locks_stop_in_the_next_step,
+        the_inertia_of_a_locked_body_turns_with_no_joint,
         a_contact_problem_of_locked_bodies_is_refused_by_name,
     }
 }
@@ -190,14 +191,29 @@ fn axes_that_a_caller_locks_stop_in_the_next_step() {
     let mut simulation = simulation(world, 8, reference);
     simulation.step(DT).expect("a step");
     simulation.world.bodies[0].locked_rotations = [true, false, true];
+    let before = simulation.world.bodies[0].rotation;
     simulation.step(DT).expect("a step");
     let body = &simulation.world.bodies[0];
+    // It does not turn about these axes in that step either; 1 rad/s would be 1/120.
+    let turned = body.rotation * before.inverse();
+    assert!(turned.x.abs().max(turned.z.abs()) < 1e-5 && turned.y.abs() > 0.01, "{turned}");
     assert_eq!((body.angular_velocity, body.linear_velocity), (Vec3::Y * body.angular_velocity.y, Vec3::X));
     assert!((body.angular_velocity.y - 2.0).abs() < 1e-5);
     simulation.world.bodies[0].locked_rotations = [false; 3];
     simulation.world.bodies[0].apply_angular_impulse(Vec3::X);
     simulation.step(DT).expect("a step");
     assert!((simulation.world.bodies[0].angular_velocity.x - 1.0).abs() < 1e-5);
+}
+
+/// Locked axes are axes of the world, and so no row turns the inertia of a body with them.
+fn the_inertia_of_a_locked_body_turns_with_no_joint() {
+    for axes in [[true; 3], [true, false, false], [false, true, false]] {
+        for substeps in [8, 32, 64] {
+            let mut simulation = simulation(mixture(|_| axes), substeps, reference);
+            simulation.step(DT).expect("a step");
+            assert!(simulation.problem().turning.is_empty(), "{axes:?}, {substeps} substeps");
+        }
+    }
 }
 
 fn a_contact_problem_of_locked_bodies_is_refused_by_name() {

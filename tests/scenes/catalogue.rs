@@ -303,6 +303,14 @@ fn a_turnstile_with_more_balls_than_pass_does_not_jam() {
     assert!(passed[3999] > passed[2999] + 2, "{} balls passed, and {} in the end", passed[2999], passed[3999]);
 }
 
+/// A ball waits for the place of the one before, so that what comes does not show it.
+#[test]
+fn balls_of_a_board_come_one_after_another() {
+    let scene = Scene::find("galton", &["n=5".into(), "every=12".into()]).expect("the scene");
+    let first: Vec<_> = scene.spawners.iter().map(|spawner| spawner.first).collect();
+    assert_eq!(first, [0, 12, 24, 36, 48]);
+}
+
 #[test]
 fn sensors_count_every_ball_of_a_board_once_on_any_backend() {
     const BALLS: u32 = 30;

@@ -134,6 +134,9 @@ fn dark_shades_change_the_ground_and_what_is_behind_it_and_no_body() {
     assert!(same > 1000 && darker > 20_000 && same + darker == all, "{same} same, {darker} darker of {all}");
     let is_background = |p: &[u8]| (0..3).all(|k| (f32::from(p[k]) / 255.0 - Shades::DARK.background[k]).abs() < 0.01);
     assert!(is_background(&dark.rgba[..4]), "{:?}", &dark.rgba[..4]);
+    // The color of other fixed bodies is none of the half-space.
+    canvas.renderer.shades = Shades { fixed: [255, 0, 0, 255], ..Shades::DARK };
+    assert!(drawn_on(&mut canvas, &scene).rgba == dark.rgba, "the ground has another color");
     // The mesh and the height field of this scene are fixed, and gray.
     let drop = self::scene("drop", &[]);
     let mut canvas = self::canvas(&drop);
