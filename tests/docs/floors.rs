@@ -18,7 +18,8 @@ const LIBRARY: &[&[&str]] = &[
 ];
 
 /// The modules of scenes, above the engine.
-const SCENES: &[&[&str]] = &[&["spawner"], &["scene"], &["catalogue", "spawners", "file"], &["find"], &["recording"]];
+const SCENES: &[&[&str]] =
+    &[&["driver", "spawner"], &["scene"], &["catalogue", "spawners", "file"], &["find"], &["recording"]];
 
 /// The modules of contact problems, above the engine.
 const PROBLEMS: &[&[&str]] = &[&["contacts"], &["residuals"], &["solver", "step"], &["batch"]];

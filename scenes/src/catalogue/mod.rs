@@ -18,7 +18,6 @@ mod vehicle;
 
 pub use entry::{Entry, MAX_BODIES, Parameter};
 pub use families::{Family, Law, Member};
-pub(crate) use vehicle::drive;
 
 use drystone::Result;
 use drystone::stages::error::ensure;

@@ -4,53 +4,24 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 use glam::{Quat, Vec3};
 
-use crate::driver::Driver;
+use crate::driver::{Driver, RADIUS, TORQUE, Turn, WHEELBASE};
 use crate::scene::Scene;
 use drystone::stages::math::rotation::about;
-use drystone::{Axis, Body, BodyHandle, Bounds, Joint, MassProperties, Result, Shape, World};
+use drystone::{Axis, Body, Joint, MassProperties, Result, Shape, World};
 
-/// Wheels: radius (m), mass (kg), and their places on the chassis, the front ones first: half of the wheelbase, half of
+/// Mass of a wheel (kg), and the places of the wheels on the chassis, the front ones first: half of the wheelbase, half of
 /// the track (m).
-const RADIUS: f32 = 0.35;
 const WHEEL: f32 = 30.0;
-const PLACES: [(f32, f32); 4] = [(1.3, -0.9), (1.3, 0.9), (-1.3, -0.9), (-1.3, 0.9)];
-const WHEELBASE: f32 = 2.0 * PLACES[0].0;
+const PLACES: [(f32, f32); 4] =
+    [(0.5 * WHEELBASE, -0.9), (0.5 * WHEELBASE, 0.9), (-0.5 * WHEELBASE, -0.9), (-0.5 * WHEELBASE, 0.9)];
 /// Mass of the chassis (kg), and its height above level ground (m).
 const CHASSIS: f32 = 1200.0;
 const HEIGHT: f32 = 0.75;
 /// Frequency of the chassis on its springs (Hz), and their damping ratio.
 const RIDE: (f32, f32) = (1.5, 0.4);
-/// Largest torque on each wheel (N m).
-const TORQUE: f32 = 300.0;
 /// Half of the side of the terrain (m), and the number of cells along it.
 const HALF: f32 = 100.0;
 const CELLS: usize = 100;
-/// A driver's largest speed (m/s) and steering (rad), and the angular speed at which the wheels steer (rad/s).
-const MAX_SPEED: f32 = 10.0;
-const MAX_STEERING: f32 = 0.5;
-const STEERING_RATE: f32 = 1.0;
-/// Largest lateral acceleration to which a driver steers (m/s²). The vehicle turns over at up to 1.26 g.
-const MAX_LATERAL: f32 = 4.0;
-
-/// The circle on which a vehicle drives.
-pub(super) struct Turn {
-    /// Speed of the vehicle (m/s).
-    pub speed: f32,
-    /// Angle of a wheel in the middle of the front axle, positive to the left (rad).
-    pub steering: f32,
-}
-
-impl Turn {
-    /// Angle of a wheel (rad) and its angular speed about Z (rad/s). All axles pass through the center of one circle,
-    /// and each wheel rolls at the speed of its place.
-    fn of_wheel(&self, (x, z): (f32, f32)) -> (f32, f32) {
-        let curvature = libm::tanf(self.steering) / WHEELBASE;
-        // From the middle of the rear axle.
-        let (ahead, across) = (curvature * (x + PLACES[0].0), 1.0 + curvature * z);
-        let angle = libm::atan2f(ahead, across);
-        (angle, -self.speed / RADIUS * (ahead * ahead + across * across).sqrt())
-    }
-}
 
 /// Frequency (Hz) and damping ratio of an axis along Y between a chassis and a wheel of `wheel` kg at `arm`, for a
 /// stiffness (N/m) and a damping (N s/m): frequency and damping ratio refer to the mass that the spring moves, which is
@@ -95,23 +66,6 @@ pub(super) fn vehicle(speed: f32, degrees: f32, hills: f32, load: f32, mu: f32) 
         world.join(joint.generic([Axis::LOCKED, spring, Axis::LOCKED], [spin, steer, Axis::LOCKED]));
     }
     Ok(Scene { driver: Some(Driver::vehicle(driven)), ..Scene::new("vehicle", world, 600) })
-}
-
-/// Turns and steers the wheels of a chassis in a step of `dt` seconds: forward and to the right by -1 to 1.
-pub(crate) fn drive(world: &mut World, chassis: BodyHandle, forward: f32, right: f32, dt: f32) {
-    let Some(body) = world.body(chassis) else { return };
-    let speed = body.linear_velocity.dot(body.rotation * Vec3::X);
-    let sharpest = libm::atanf(MAX_LATERAL * WHEELBASE / (speed * speed)).min(MAX_STEERING);
-    let turn = Turn { speed: forward * MAX_SPEED, steering: -right * sharpest };
-    for joint in world.joints.iter_mut().filter(|joint| joint.body_b == Some(chassis)) {
-        let (angle, spin) = turn.of_wheel((joint.anchor_b.x, joint.anchor_b.z));
-        let [roll, steer, _] = &mut joint.angular;
-        *roll = roll.motor(spin, TORQUE);
-        if let Bounds::Between { min, .. } = steer.bounds {
-            let angle = min + (angle - min).clamp(-STEERING_RATE * dt, STEERING_RATE * dt);
-            *steer = Axis::limited(angle, angle);
-        }
-    }
 }
 
 /// Rows of heights (m), level around the start.
