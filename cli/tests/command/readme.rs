@@ -26,6 +26,14 @@ const NOT_RUN: &[(&str, &str)] = &[
         "it needs GNU parallel and four machines",
     ),
     ("parallel --retry-failed --joblog jobs.log", "it needs GNU parallel and four machines"),
+    (
+        "python -m drystone.shard module:function --runs runs.jsonl --shard 2/4 --out part-2.jsonl",
+        "it needs the Python package: python/tests/test_survey.py runs it",
+    ),
+    (
+        "python -m drystone.shard module:function --runs runs.jsonl --merge part-*.jsonl --out rows.jsonl",
+        "it needs the Python package: python/tests/test_survey.py runs it",
+    ),
 ];
 
 /// Shorter arguments for a test, which has less work with them; every option stays.
