@@ -109,6 +109,7 @@ impl Group {
             let mut problems: Vec<&mut StepProblem> =
                 chosen.map(|(_, job)| job.1.simulation_mut().problem_mut()).collect();
             let ran = panics::caught(|| self.run_as_one(&mut problems, &config, kind));
+            debug_assert!(matches!(ran, Ok(Ok(()))), "steps of one kind do not run as one");
             // If that failed, each world runs its own step, which is unchanged.
             if let Ok(Ok(())) = ran {
                 own.into_iter().for_each(|k| stages[k] = Stage::Ran);

@@ -58,6 +58,8 @@ fn guess(x: __m256) -> __m256 {
 }
 
 impl Lanes for Avx2 {
+    const NAME: &'static str = "AVX2";
+
     #[inline(always)]
     fn load(from: &Wide) -> Self {
         Self(unsafe { [_mm256_load_ps(from.0.as_ptr()), _mm256_load_ps(from.0.as_ptr().add(8))] })

@@ -38,6 +38,8 @@ lane! {
 }
 
 impl Lanes for Avx512 {
+    const NAME: &'static str = "AVX-512";
+
     #[inline(always)]
     fn load(from: &Wide) -> Self {
         Self(unsafe { _mm512_load_ps(from.0.as_ptr()) })

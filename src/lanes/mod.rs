@@ -15,8 +15,18 @@ mod portable;
 mod shared;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod simd128;
+#[cfg(target_arch = "x86_64")]
+mod sse2;
 #[cfg(test)]
 mod tests;
+
+// A program has its baseline alone: the lanes of plain Rust are the slowest to compile and to run.
+#[cfg(not(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128"))))]
+use portable::Portable as Baseline;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+use simd128::Simd128 as Baseline;
+#[cfg(target_arch = "x86_64")]
+use sse2::Sse2 as Baseline;
 
 pub use instructions::{InstructionSet, Work};
 pub use portable::Portable;
@@ -39,6 +49,8 @@ pub struct Row8(pub [f32; 8]);
 
 /// A lane of sixteen numbers.
 pub trait Lanes: Lane {
+    /// Name of the instruction set, for reports.
+    const NAME: &'static str;
     /// Loads from memory.
     fn load(from: &Wide) -> Self;
     /// Stores to memory.

@@ -27,6 +27,8 @@ lane! {
 }
 
 impl Lanes for Portable {
+    const NAME: &'static str = "portable";
+
     #[inline(always)]
     fn load(from: &Wide) -> Self {
         Self(*from)

@@ -49,6 +49,8 @@ fn guess(x: v128) -> v128 {
 }
 
 impl Lanes for Simd128 {
+    const NAME: &'static str = "simd128";
+
     #[inline(always)]
     fn load(from: &Wide) -> Self {
         // SAFETY: sixteen numbers are at the address; a load needs no alignment.

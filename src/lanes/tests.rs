@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Mutex;
 
-use super::{InstructionSet, Lanes, Row8, WIDTH, Wide, Work};
+use super::{InstructionSet, Lanes, Portable, Row8, WIDTH, Wide, Work};
 use crate::math::Lane;
 
 /// Zeros of both signs, the smallest and the largest numbers, infinities and NaN.
@@ -79,17 +79,26 @@ fn sixteen(a: Wide, b: Wide) -> Sixteen {
     Sixteen { a, b, rows, places, results: Mutex::default() }
 }
 
+type Run = Box<dyn Fn(&Sixteen)>;
+
+/// Plain Rust, and each instruction set of this processor.
+fn each() -> impl Iterator<Item = (&'static str, Run)> {
+    let plain: Run = Box::new(|work| work.over::<Portable>(0..1));
+    let of = |set: InstructionSet| (set.name(), Box::new(move |work: &Sixteen| set.run(work, 0..1)) as Run);
+    std::iter::once((Portable::NAME, plain)).chain(InstructionSet::each().map(of))
+}
+
 fn same(x: f32, y: f32) -> bool {
     x.to_bits() == y.to_bits() || x.is_nan() && y.is_nan()
 }
 
 #[test]
 fn every_set_compares_and_chooses_as_a_number_does() {
-    for set in InstructionSet::each() {
+    for (set, run) in each() {
         for turn in 0..WIDTH {
             let b = std::array::from_fn(|lane| NUMBERS[(lane + turn) % WIDTH]);
             let work = sixteen(Wide(NUMBERS), Wide(b));
-            set.run(&work, 0..1);
+            run(&work);
             let results = work.results.into_inner().expect("one thread").0;
             for lane in 0..WIDTH {
                 let (x, y) = (NUMBERS[lane], b[lane]);
@@ -97,7 +106,7 @@ fn every_set_compares_and_chooses_as_a_number_does() {
                 let exact = [x.sqrt(), x / y, x.copysign(y), below];
                 for (k, expected) in done(x, y).into_iter().chain(exact).enumerate() {
                     let found = results[k].0[lane];
-                    assert!(same(found, expected), "{}: {x:e} and {y:e}, {k}: {found:e}, not {expected:e}", set.name());
+                    assert!(same(found, expected), "{set}: {x:e} and {y:e}, {k}: {found:e}, not {expected:e}");
                 }
             }
         }
@@ -106,14 +115,14 @@ fn every_set_compares_and_chooses_as_a_number_does() {
 
 #[test]
 fn every_set_brings_rows_to_lanes_and_back() {
-    for set in InstructionSet::each() {
+    for (set, run) in each() {
         let work = sixteen(Wide(NUMBERS), Wide(NUMBERS));
-        set.run(&work, 0..1);
+        run(&work);
         let (columns, back) = work.results.into_inner().expect("one thread");
         for (lane, (place, back)) in work.places.iter().zip(&back).enumerate() {
             let row = work.rows[*place as usize / 4];
             let found: Vec<f32> = columns[15..].iter().map(|column| column.0[lane]).collect();
-            assert_eq!((&found[..], *back), (&row.0[..], row), "{}, lane {lane}", set.name());
+            assert_eq!((&found[..], *back), (&row.0[..], row), "{set}, lane {lane}");
         }
     }
 }

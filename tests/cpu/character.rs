@@ -156,6 +156,37 @@ fn a_slope_that_is_too_steep_lets_it_slide_with_the_acceleration_of_gravity() {
 }
 
 #[test]
+fn it_leaves_a_steep_slope_with_the_velocity_of_its_slide() {
+    let degrees = 60_f32;
+    let (sine, cosine) = degrees.to_radians().sin_cos();
+    let mut world = ramp(degrees);
+    world.bodies[1].position.y += 20.0;
+    // One meter above the lower edge.
+    let start = Vec3::new(cosine, sine, 0.0) + (RADIUS + MARGIN) * Vec3::new(-sine, cosine, 0.0) + 20.0 * Vec3::Y;
+    let mut walk = Walk::at(world, start + (0.5 * HEIGHT - RADIUS) * Vec3::Y);
+    walk.steps(45, Vec3::ZERO);
+    let before = walk.position();
+    walk.steps(10, Vec3::ZERO);
+    let (moved, expected) = (walk.position().x - before.x, -10.0 * DT * cosine * (2.0 * 9.81 * sine).sqrt());
+    assert!((moved / expected - 1.0).abs() < 0.05, "{moved}, not {expected} m");
+}
+
+#[test]
+fn a_jump_against_a_steep_slope_is_no_higher_than_elsewhere() {
+    for degrees in [46.0, 60.0] {
+        let mut walk = Walk::at(ramp(degrees), Vec3::new(-0.5, MIDDLE, 0.0));
+        walk.steps(5, Vec3::ZERO);
+        walk.character.launch(4.0 * Vec3::Y);
+        let mut highest = 0.0_f32;
+        for _ in 0..60 {
+            walk.step(3.0 * Vec3::X);
+            highest = highest.max(walk.position().y - MIDDLE);
+        }
+        assert!(highest < 16.0 / (2.0 * 9.81) + 0.01, "{degrees} degrees: {highest} m");
+    }
+}
+
+#[test]
 fn steps_up_to_the_limit_are_climbed_and_higher_ones_are_walls() {
     for share in [0.3, 0.6, 0.9, 0.98] {
         let height = share * STEP;

@@ -49,6 +49,33 @@ fn a_contact_stays_in_its_row_while_others_come_and_go() {
     assert_eq!(simulation.problem().swept_contacts().count(), 5);
 }
 
+/// The last pair takes the place of one that ended, also where nothing of it moves.
+#[test]
+fn a_sleeping_contact_keeps_its_points_while_another_ends() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    for i in 0..8 {
+        world.add(ball(2.0 * i as f32, 0.5));
+    }
+    let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+    run(&mut simulation, 120);
+    let contact = |simulation: &Simulation| {
+        let contact = simulation.contacts().find(|contact| contact.b.body.index() == 8 || contact.a.body.index() == 8);
+        contact.map(|contact| (contact.points().to_vec(), contact.normal))
+    };
+    let before = contact(&simulation).expect("it lies on the ground");
+    assert!(simulation.is_asleep(8) && before.0[0].position.distance(Vec3::X * 14.0) < 0.01, "{before:?}");
+    simulation.world.bodies[1].position.y = 50.0;
+    run(&mut simulation, 5);
+    assert!(simulation.is_asleep(8));
+    assert_eq!(contact(&simulation), Some(before.clone()));
+    // Woken, it rests where it lay.
+    simulation.world.bodies[8].linear_velocity = Vec3::X * 1e-3;
+    run(&mut simulation, 5);
+    let after = contact(&simulation).expect("it lies on the ground");
+    assert!(after.0[0].position.distance(before.0[0].position) < 1e-3 && after.1 == before.1, "{after:?}");
+}
+
 #[test]
 fn a_manifold_in_the_slot_of_one_that_ended_begins_without_its_impulses_and_preload() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {

@@ -25,6 +25,7 @@ tests! {
     no_gpu {
         a_body_that_may_not_touch_wakes_no_sleeper,
         a_hook_that_panics_leaves_the_world_as_it_was,
+        points_that_were_dropped_once_are_there_in_the_next_step,
         a_loaded_run_goes_on_with_the_same_bits,
         a_hook_takes_the_friction_from_a_contact_at_rest_at_once,
         a_material_out_of_range_is_an_error_that_names_the_bodies,
@@ -215,6 +216,23 @@ fn a_cube_that_keeps_two_points_tips_about_them(open: Open) {
     steps(&mut simulation, 180);
     assert!(simulation.world.bodies[body].linear_velocity.length() < 1e-3);
     assert!(simulation.manifolds().all(|manifold| manifold.points().len() == 4));
+}
+
+fn points_that_were_dropped_once_are_there_in_the_next_step() {
+    let mut world = World::new();
+    world.add(floor());
+    world.add(cube().position(0.0, 0.5, 0.0));
+    let mut simulation = simulation(world, reference);
+    steps(&mut simulation, 10);
+    let points = |simulation: &mut Simulation| simulation.manifolds().map(|m| m.points().len()).collect::<Vec<_>>();
+    simulation.set_hooks(modifying(|_, contact| {
+        contact.points_mut().iter_mut().for_each(|point| point.is_dropped = point.position.x > 0.0);
+    }));
+    steps(&mut simulation, 1);
+    assert_eq!(points(&mut simulation), [2]);
+    simulation.set_hooks(None);
+    steps(&mut simulation, 1);
+    assert_eq!(points(&mut simulation), [4]);
 }
 
 /// Cubes, balls and boards that fall on each other.

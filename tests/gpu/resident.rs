@@ -26,6 +26,7 @@ tests! {
         a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew,
         a_device_carries_no_friction_that_a_surface_lost,
         a_device_takes_the_points_that_are_sent,
+        a_device_bounces_only_what_was_pressed_in_the_same_step,
         a_body_that_is_placed_on_a_tower_begins_on_a_device_with_what_it_rests_with,
     }
     any_gpu {
@@ -110,6 +111,26 @@ fn what_is_asked_for_has_the_bits_of_the_reference() {
         }
     }
     assert!(computed > 100 && reused > 1000, "{computed} computed, {reused} reused: hardly a test");
+}
+
+/// A ball that bounces so low that its contact stays.
+fn a_device_bounces_only_what_was_pressed_in_the_same_step() {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(0.95));
+    world.add(Body::dynamic().shape(Shape::ball(0.5)).restitution(0.95).position(0.0, 0.504, 0.0));
+    let config = SolverConfig::default().without_sleep().with(|c| c.restitution_threshold = 0.1);
+    let mut both = [Box::new(Reference::<f32>::new()) as Box<dyn Backend>, Box::new(gpu::exact())]
+        .map(|backend| Simulation::with(world.clone(), config.clone(), backend).expect("a good world"));
+    let (mut bounces, mut before) = (0, 0.0);
+    for step in 1..=60 {
+        let stats = both.each_mut().map(|simulation| simulation.step(1.0 / 60.0).expect("a step"));
+        assert_eq!(stats[0].manifolds, 1, "step {step}");
+        assert_together(&both, &format!("step {step}"));
+        let speed = both[0].world.bodies[1].linear_velocity.y;
+        bounces += u32::from(before < -0.1 && speed > 0.1);
+        before = speed;
+    }
+    assert!(bounces > 5, "{bounces} bounces");
 }
 
 fn what_somebody_changes_between_two_steps_reaches_the_device() {

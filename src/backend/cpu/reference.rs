@@ -333,22 +333,31 @@ impl<S: Scalar> SystemRows<S> for OneSystem<'_, S> {
     }
 }
 
-impl<S: Scalar> Backend for Reference<S> {
-    fn name(&self) -> &'static str {
-        "reference"
-    }
+/// For each number, and not for all: a program that uses the crate would otherwise compile the kernels again.
+macro_rules! backend {
+    ($($Number:ty),*) => {
+        $(
+        impl Backend for Reference<$Number> {
+            fn name(&self) -> &'static str {
+                "reference"
+            }
 
-    fn adapter(&self) -> String {
-        format!("one thread, scalar f{}", 8 * size_of::<S>())
-    }
+            fn adapter(&self) -> String {
+                format!("one thread, scalar f{}", 8 * size_of::<$Number>())
+            }
 
-    fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
-        let (problem, passes) = step.into_parts();
-        self.rows.load(problem);
-        self.convergence = problem.convergence;
-        self.advance(problem, passes);
-        self.rows.store(problem);
-        problem.convergence = self.convergence;
-        Ok(())
-    }
+            fn run_checked(&mut self, step: CheckedStep) -> Result<()> {
+                let (problem, passes) = step.into_parts();
+                self.rows.load(problem);
+                self.convergence = problem.convergence;
+                self.advance(problem, passes);
+                self.rows.store(problem);
+                problem.convergence = self.convergence;
+                Ok(())
+            }
+        }
+        )*
+    };
 }
+
+backend!(f32, f64);

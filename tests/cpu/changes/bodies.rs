@@ -1,10 +1,10 @@
 //! Masses, materials and numbers of bodies that change, and changes that are refused.
 
-use drystone::glam::Vec3;
+use drystone::glam::{Quat, Vec3};
 use drystone::{Body, Joint, Shape, Simulation, SolverConfig, World};
 use drystone_conform::compare::Difference;
 
-use super::{BOTH, DT, cpu, cube, run, simulation, standing};
+use super::{BOTH, DT, cpu, cube, ground, run, simulation, standing};
 
 #[test]
 fn masses_and_materials_may_change() {
@@ -174,6 +174,51 @@ fn a_body_that_a_step_took_out_of_range_touches_nothing() {
             simulation.world.bodies[5].position.y = 2e9;
             assert!(simulation.step(DT).is_err_and(|e| e.to_string().starts_with("body 5 \"\": position")));
         }
+    }
+}
+
+/// The numbers of a body out of range mean nothing: it has no contact even where it touched to the end.
+#[test]
+fn a_body_that_left_the_range_leaves_its_contacts() {
+    for backend in BOTH {
+        let mut world = World::new();
+        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.0));
+        let ball = Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).friction(0.0).position(0.0, 0.5, 0.0);
+        world.add(ball);
+        world.bodies[1].force = Vec3::X * 9e8;
+        let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
+        let far = |simulation: &Simulation| simulation.world.bodies[1].position.x;
+        while far(&simulation) < 0.9e15 {
+            simulation.step(1.0).expect("a step");
+        }
+        assert_eq!(simulation.manifolds().count(), 1, "at {:e} m", far(&simulation));
+        while far(&simulation) < 1.1e15 {
+            simulation.step(1.0).expect("a step");
+        }
+        assert_eq!(simulation.manifolds().count(), 0, "at {:e} m", far(&simulation));
+    }
+}
+
+/// A cube lies as high as its present shape says.
+#[test]
+fn a_shape_that_changes_or_moves_within_its_body_carries_it_from_the_next_step_on() {
+    let mut world = World::new();
+    world.add(ground());
+    world.add(cube(0.0, 0.5, 0.0));
+    let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
+    let mut height = |change: fn(&mut Body)| {
+        change(&mut simulation.world.bodies[1]);
+        run(&mut simulation, 90);
+        simulation.world.bodies[1].position.y
+    };
+    let heights = [
+        height(|_| {}),
+        height(|body| body.colliders[0].shape = Shape::cuboid(0.5, 0.4, 0.5)),
+        height(|body| body.colliders[0].position.y = 0.1),
+        height(|body| body.colliders[0].rotation = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2)),
+    ];
+    for (height, expected) in heights.iter().zip([0.5, 0.4, 0.3, 0.4]) {
+        assert!((height - expected).abs() < 1e-3, "{heights:?} m");
     }
 }
 
