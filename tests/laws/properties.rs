@@ -31,6 +31,8 @@ struct Group {
     collides: &'static [bool],
     config: SolverConfig,
     rate: u32,
+    /// Of the worlds of each kind, one in so many runs.
+    one_in: usize,
     backend: fn() -> Box<dyn Backend>,
 }
 
@@ -38,7 +40,8 @@ impl Group {
     /// By default, on lanes.
     fn new(families: &'static [Family], kinds: &'static [Kind]) -> Self {
         let collides = &[false, true];
-        Self { families, kinds, collides, config: SolverConfig::default(), rate: 60, backend: || Box::new(Cpu::new()) }
+        let backend = || Box::new(Cpu::new()) as Box<dyn Backend>;
+        Self { families, kinds, collides, config: SolverConfig::default(), rate: 60, one_in: 1, backend }
     }
 
     fn preset(self, preset: Preset) -> Self {
@@ -50,7 +53,7 @@ impl Group {
         for &family in self.families {
             for &kind in self.kinds {
                 for &collides in self.collides {
-                    for seed in 0..worlds() {
+                    for seed in (0..worlds()).step_by(self.one_in) {
                         let drawn = Drawn { family, kind, collides, seed };
                         all.push((drawn, Case::new(drawn.scene(), self.config.clone(), self.rate, SECONDS)));
                     }
@@ -106,8 +109,8 @@ fn bodies_without_joints_stay_finite_and_keep_their_momentum() {
 fn joints_without_contacts_keep_the_momentum() {
     let group = || Group { collides: &[false], ..Group::new(&[Family::Plain], JOINTED) };
     group().keeps(&["momentum"]);
-    group().preset(Preset::Fast).keeps(&["momentum"]);
-    Group { rate: 30, ..group() }.keeps(&["momentum"]);
+    Group { one_in: 3, ..group() }.preset(Preset::Fast).keeps(&["momentum"]);
+    Group { one_in: 3, rate: 30, ..group() }.keeps(&["momentum"]);
 }
 
 #[test]

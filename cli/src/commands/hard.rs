@@ -35,7 +35,7 @@ pub struct HardArgs {
     backend: BackendKind,
     /// Judge N random worlds of each family instead of the cases.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    #[arg(conflicts_with_all = ["case", "short", "out", "shard", "merge"])]
+    #[arg(conflicts_with_all = ["case", "short"])]
     families: Option<u32>,
     /// Judge only this family; can be repeated.
     #[arg(long, value_name = "NAME", value_parser = words::of::<Family>(), requires = "families")]
@@ -55,10 +55,12 @@ pub struct HardArgs {
     /// presets up to `accurate`.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "set", "json", "out", "shard", "merge"])]
     page: Option<PathBuf>,
-    /// Write the checks as CSV, each case when it ends. An interrupted run continues after the cases in FILE.
+    /// Write the checks as CSV. An interrupted run continues after the cases or worlds in FILE.
+    ///
+    /// Each case is written when it ends, and the worlds of families every five seconds.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run part I of N of the cases.
+    /// Run part I of N of the cases, or of the worlds of all families.
     #[arg(long, value_name = "I/N", requires = "out")]
     shard: Option<Shard>,
     /// Read the checks from --out files of shards with the same arguments, from any machines, and run nothing.
@@ -132,24 +134,33 @@ impl HardArgs {
                 .try_for_each(|family| print(format_args!("{:<14}  {}", family.name(), family.summary())));
         }
         let seeds = families::seeds(self.seed, count)?;
-        let judge = |setup: &Setup, what: &str| {
-            let bar = Mutex::new(Progress::new("world", (families.len() * seeds.len()) as u64, false));
+        let worlds = families.iter().flat_map(|&family| seeds.iter().map(move |&seed| (family, seed)));
+        let shard = self.shard.unwrap_or(Shard::WHOLE);
+        let worlds: Vec<_> = worlds.enumerate().filter(|(k, _)| shard.has(*k)).map(|(_, world)| world).collect();
+        let judge = |rows: &mut HardRows, setup: &Setup, what: &str| {
+            let bar = Mutex::new(Progress::new("world", worlds.len() as u64, false));
             bar.lock().expect("no panic").set_message(what);
-            let shares = families::judge_all(&families, &seeds, setup, || bar.lock().expect("no panic").inc())?;
+            let judged = rows.judge(&worlds, setup, || bar.lock().expect("no panic").inc())?;
             bar.into_inner().expect("no panic").finish();
-            Ok(shares)
+            Ok(judged)
         };
         if let Some(directory) = &self.page {
             let page = hard_families::page(&seeds, |preset| {
-                let config = preset.config().without_sleep();
-                judge(&Setup { config, open: &|| self.backend.open(false) }, preset.name())
+                let setup = Setup { config: preset.config().without_sleep(), open: &|| self.backend.open(false) };
+                let mut rows = HardRows::open(None, &setup, &self.backend.to_string())?;
+                Ok(families::shares(&families, &judge(&mut rows, &setup, preset.name())?))
             })?;
             let path = directory.join("families.md");
             crate::files::write(&path, page.as_bytes())?;
             return print(path.display());
         }
         let setup = Setup { config: self.config()?, open: &|| self.backend.open(false) };
-        let shares = judge(&setup, self.preset.name())?;
+        let mut rows = HardRows::open(self.out.as_deref(), &setup, &self.backend.to_string())?;
+        let judged = match &self.merge[..] {
+            [] => judge(&mut rows, &setup, self.preset.name())?,
+            files => rows.merge_worlds(&worlds, files)?,
+        };
+        let shares = families::shares(&families, &judged);
         if self.json {
             let world = |family: Family, world: &Judged| json!({"seed": world.seed, "scene": family.spec(world.seed), "passed": passes(&world.checks), "ms": world.ms, "checks": world.checks});
             let families = shares.iter().map(|share| {

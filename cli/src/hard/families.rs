@@ -81,27 +81,24 @@ pub fn seeds(first: u64, count: u32) -> Result<Vec<u64>> {
     Ok((first..end).collect())
 }
 
-/// Judges the worlds of some seeds in each family, one world at a time on each thread of the machine. It calls `done`
-/// after each world.
+/// Judges worlds, one at a time on each thread of the machine. It calls `done` after each world.
 ///
 /// # Errors
-/// A world cannot be run.
+/// A world cannot be run, or `done` returns an error.
 pub fn judge_all(
-    families: &[Family],
-    seeds: &[u64],
+    worlds: &[(Family, u64)],
     setup: &Setup,
-    done: impl Fn() + Sync,
-) -> Result<Vec<FamilyShare>> {
-    let tasks: Vec<(Family, u64)> =
-        families.iter().flat_map(|&family| seeds.iter().map(move |&seed| (family, seed))).collect();
+    done: impl Fn(Family, &Judged) -> Result<()> + Sync,
+) -> Result<Vec<(Family, Judged)>> {
     let (next, judged) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || -> Result<()> {
         let pool = one_thread()?;
-        while let Some(&(family, seed)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+        while let Some(&(family, seed)) = worlds.get(next.fetch_add(1, Ordering::Relaxed)) {
             let Member { scene, law } = family.member(seed)?;
             let world = pool.install(|| judge(&scene, &law, setup)).map_err(|e| e.within(family.spec(seed)))?;
-            judged.lock().expect("no panic").push((family, Judged { seed, ..world }));
-            done();
+            let world = Judged { seed, ..world };
+            done(family, &world)?;
+            judged.lock().expect("no panic").push((family, world));
         }
         Ok(())
     };
@@ -110,16 +107,18 @@ pub fn judge_all(
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
         workers.into_iter().try_for_each(|worker| worker.join().expect("no panic"))
     })?;
-    let judged = judged.into_inner().expect("no panic");
-    Ok(families
-        .iter()
-        .map(|&family| {
-            let own = judged.iter().filter(|(of, _)| *of == family);
-            let mut worlds: Vec<_> = own.map(|(_, world)| world.clone()).collect();
-            worlds.sort_by_key(|world| world.seed);
-            FamilyShare { family, worlds }
-        })
-        .collect())
+    Ok(judged.into_inner().expect("no panic"))
+}
+
+/// The results by family, without families that have none.
+pub fn shares(families: &[Family], judged: &[(Family, Judged)]) -> Vec<FamilyShare> {
+    let share = |&family: &Family| {
+        let own = judged.iter().filter(|(of, _)| *of == family);
+        let mut worlds: Vec<_> = own.map(|(_, world)| world.clone()).collect();
+        worlds.sort_by_key(|world| world.seed);
+        FamilyShare { family, worlds }
+    };
+    families.iter().map(share).filter(|share| !share.worlds.is_empty()).collect()
 }
 
 /// Makes a pool of one thread. The steps of a world use the threads of the pool that they run in.

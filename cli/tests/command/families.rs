@@ -41,6 +41,36 @@ fn worlds_that_fail_are_printed_as_commands_that_run_them() {
     assert_eq!(hash("run family -p kind=slopes -p seed=5 --no-sleep"), hashes[0]);
 }
 
+/// The parts of two machines have the worlds of one run, and a run goes on after the worlds that are in its file.
+#[test]
+fn parts_of_a_survey_merge_to_the_whole_and_a_run_continues() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| folder.path().join(name).display().to_string();
+    let what = "hard --families 3 --family slopes --family pushed-blocks --set friction=none";
+    let part = |k: u32| {
+        let out = file(&format!("part-{k}.csv"));
+        (output(&format!("{what} --shard {k}/2 --out {out}")), out)
+    };
+    let [(first, a), (_, b)] = [1, 2].map(part);
+    assert!(first.contains("of 2 pass") && first.contains("of 1 pass"), "{first}");
+    let whole = output(what);
+    let merged = file("all.csv");
+    let of_parts = output(&format!("{what} --merge {a} {b} --out {merged}"));
+    // Times differ from run to run.
+    let without_times = |text: &str| -> Vec<String> {
+        text.lines().map(|line| line.split(" confidence").next().unwrap_or_default().to_owned()).collect()
+    };
+    assert_eq!(without_times(&of_parts), without_times(&whole));
+    // All worlds are known: nothing runs, and the times are those of the file.
+    assert_eq!(output(&format!("{what} --out {merged}")), of_parts);
+    let before = std::fs::read_to_string(&a).expect("rows");
+    assert_eq!(output(&format!("{what} --shard 1/2 --out {a}")), first);
+    assert_eq!(std::fs::read_to_string(&a).expect("rows"), before);
+    let refused = run(&format!("{what} --merge {a}"));
+    let line = text(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && line.contains("no rows of family:kind=slopes,seed=2"), "{line}");
+}
+
 #[test]
 fn the_share_as_json_has_every_world_with_its_checks() {
     let all = json("hard --families 3 --family slopes --family pushed-blocks --json");
