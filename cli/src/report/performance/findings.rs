@@ -105,8 +105,8 @@ fn stages(rows: &[FallingRow]) -> String {
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The time of the sweeps is the least of the stage `run`, in parentheses relative \
-         to the smallest island. Bytes are the peak of the process. Other times are in ms.\n\n\
+        "A plane pyramid is one island. The time of the sweeps is the least of the stage `run`, in parentheses \
+         relative to the smallest island. Bytes are the peak of the process. Other times are in ms.\n\n\
          | boxes | sweeps, ns per manifold and pass | bytes a box | threads | step | detection | rows | sweeps |\n\
          |--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
@@ -128,9 +128,9 @@ fn growth(rows: &[GrowthRow]) -> String {
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
-        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. The bytes \
-         are those of the SIMD lanes, in parentheses those of the kernels over plain rows, which load a body for each \
-         contact. The triad is a = b + s c over the MiB that the lanes hold; bodies in a cache can exceed 100 % of it. \
+        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. The \
+         bytes are those of the SIMD lanes, in parentheses those of the kernels over plain rows, which load a body for \
+         each contact. The triad is a = b + s c over the MiB that the lanes hold; bodies in a cache can exceed 100 % of it. \
          The peak is that of multiplications and additions on registers.\n\n\
          | scene | MiB | threads | ns a manifold | bytes a manifold | million points a second | of the triad, GB/s | of the peak, G/s |\n\
          |---|--:|--:|--:|--:|--:|--:|--:|\n",
