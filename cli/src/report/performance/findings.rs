@@ -130,8 +130,8 @@ fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
         "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. The \
          bytes are those of the SIMD lanes, in parentheses those of the kernels over plain rows, which load a body for \
-         each contact. The triad is a = b + s c over the MiB that the lanes hold; bodies in a cache can exceed 100 % of it. \
-         The peak is that of multiplications and additions on registers.\n\n\
+         each contact. The triad is a = b + s c over the MiB that the lanes hold; bodies in a cache can exceed 100 % of \
+         it. The peak is that of multiplications and additions on registers.\n\n\
          | scene | MiB | threads | ns a manifold | bytes a manifold | million points a second | of the triad, GB/s | of the peak, G/s |\n\
          |---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
