@@ -151,8 +151,8 @@ impl RenderArgs {
         std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
         let (width, height) = self.size;
         let mut page = format!(
-            "# The scenes of the catalogue\n\n`drystone render --gallery {} --size {width}x{height}` makes this page. Each \
-             picture shows a scene after a\nthird of its steps. `drystone render NAME --steps N --out FILE.png` draws one.\n",
+            "# The scenes of the catalogue\n\n`drystone render --gallery {} --size {width}x{height}` makes this page: \
+             each scene after a third of its\nsteps. `drystone render NAME --steps N --out FILE.png` draws one.\n",
             folder.display()
         );
         for entry in CATALOGUE {

@@ -34,7 +34,7 @@ pub(super) fn no_direction(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let most = f64::from(world.bodies.iter().map(|b| b.mass.mass).sum::<f32>()) * 0.5 * limit * limit;
         let mut simulation = setup.simulation(world)?;
         let gained = largest(LEAST, watch(&mut simulation, 300, energy)?) - before;
-        checks.at_most(format!("{what}: energy gained over the energy at the push limit"), gained / most, 1.0);
+        checks.at_most(format!("{what}: energy gained over that at the push limit"), gained / most, 1.0);
         checks.finite(&format!("{what}: "), &simulation.world);
         Ok(())
     };
@@ -86,7 +86,7 @@ pub(super) fn nearly_parallel(setup: &Setup, checks: &mut Checks) -> Result<()> 
         let mut simulation = setup.simulation(world)?;
         (0..540).try_for_each(|_| simulation.step(DT).map(drop))?;
         let fastest = largest(LEAST, watch(&mut simulation, 60, metrics::rms_speed)?);
-        checks.at_most(format!("{what}: rms speed in the tenth second [mm/s]"), 1e3 * fastest, 1.0);
+        checks.at_most(format!("{what}: rms speed, tenth second [mm/s]"), 1e3 * fastest, 1.0);
         Ok(())
     };
     for angle in [1e-7, 1e-6, 1e-5, 1e-4, 1e-3_f32] {

@@ -34,7 +34,7 @@ pub(super) fn towers(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let outcome = setup.run(&format!("tower:n={n},offset=0.01"), TEN)?;
         checks.stands(&outcome, format!("{n} cubes"));
         checks.at_most(format!("{n} cubes: drift [m]"), outcome.drift, 0.1);
-        checks.at_most(format!("{n} cubes: rms speed at the end [m/s]"), outcome.rms, 0.05);
+        checks.at_most(format!("{n} cubes: final rms speed [m/s]"), outcome.rms, 0.05);
     }
     Ok(())
 }
@@ -46,7 +46,7 @@ pub(super) fn heavy_tops(setup: &Setup, checks: &mut Checks) -> Result<()> {
     }
     let alternating = setup.run("mass-ratio:n=10,ratio=1000", TEN)?;
     checks.stands(&alternating, "10 cubes, 1 and 1000 in turn");
-    checks.at_most("10 cubes, 1 and 1000 in turn: rms speed at the end [m/s]", alternating.rms, 0.05);
+    checks.at_most("10 cubes, 1 and 1000 in turn: final rms speed [m/s]", alternating.rms, 0.05);
     Ok(())
 }
 
@@ -143,7 +143,7 @@ pub(super) fn arches(setup: &Setup, checks: &mut Checks) -> Result<()> {
 pub(super) fn aqueduct(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let outcome = setup.run("aqueduct:arches=8", TEN)?;
     checks.stands(&outcome, "stones");
-    checks.at_most("stones: rms speed at the end [m/s]", outcome.rms, 1e-3);
+    checks.at_most("stones: final rms speed [m/s]", outcome.rms, 1e-3);
     Ok(())
 }
 
@@ -151,8 +151,8 @@ pub(super) fn large_pyramid(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let outcome = setup.run("pyramid:base=100", 10_000)?;
     checks.stands(&outcome, "boxes");
     checks.at_most("boxes: drift [m]", outcome.drift, 0.1);
-    checks.at_most("boxes: rms speed at the end [m/s]", outcome.rms, 0.05);
-    checks.at_most("boxes: overlap at the end [mm]", 1e3 * outcome.at_rest, 5.0);
+    checks.at_most("boxes: final rms speed [m/s]", outcome.rms, 0.05);
+    checks.at_most("boxes: final overlap [mm]", 1e3 * outcome.at_rest, 5.0);
     Ok(())
 }
 

@@ -67,10 +67,10 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
         COLUMNS.iter().map(|&(preset, numbers)| format!("{preset} ({}), {numbers}", substeps(preset))).collect();
     Ok(format!(
         "# Hard cases\n\n\
-         `drystone hard --page docs` makes this page. `drystone hard --case H3 --preset accurate` runs one case, and\n\
-         `drystone hard --list` describes all. The columns are presets with their substeps on the CPU lanes in single precision\n\
-         (`cpu`), the reference in double precision (`f64`) and the shaders (`gpu`). Failures are in bold. The table leaves out\n\
-         quantities that pass with 0 in every column. The adapter is\n\
+         `drystone hard --page docs` makes this page, `drystone hard --case H3 --preset accurate` runs one case, and\n\
+         `drystone hard --list` describes all. Columns are presets with their substeps: `cpu` (lanes, single precision), `f64`\n\
+         (reference) and `gpu` (shaders). Failures are bold. Quantities that are 0 and pass in every column are left out. The\n\
+         adapter is\n\
          {gpu}.\n\n\
          | case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{}",
         heads.join(" | "),

@@ -46,7 +46,7 @@ fn at_most([name, limit]: [&str; 2], value: f64, most: f64) -> Result<()> {
 pub static CATALOGUE: &[Entry] = &[
     Entry {
         name: "pile",
-        summary: "n boxes in a jittered grid fall into a container: none leaves, all come to rest, overlap stays small",
+        summary: "n boxes in a jittered grid fall into a container: none leaves, all rest, overlap stays small",
         parameters: &[
             BOXES,
             JITTER,
@@ -58,7 +58,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "pile-mixed",
-        summary: "a pile of boxes of random sizes and densities, 200 to 5000 kg/m³: none leaves, all come to rest",
+        summary: "boxes of random sizes and densities, 200 to 5000 kg/m³: none leaves, all rest",
         parameters: &[
             BOXES,
             JITTER,
@@ -75,14 +75,14 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "pyramid",
-        summary: "a plane pyramid of boxes with gaps between neighbors: it stands",
+        summary: "a plane pyramid of boxes with gaps: it stands",
         parameters: &[Parameter::whole("base", 20, (1.0, 2800.0), "boxes in the lowest row"), GAP],
         bodies: |v| triangle(v[0]),
         build: |v| Ok(boxes::pyramid(v[0] as usize, v[1] as f32)),
     },
     Entry {
         name: "many-pyramids",
-        summary: "n plane pyramids of boxes beside each other on one floor: all stand",
+        summary: "n plane pyramids of boxes on one floor: all stand",
         parameters: &[
             Parameter::whole("n", 100, (1.0, 10_000.0), "number of pyramids"),
             Parameter::whole("base", 10, (1.0, 25.0), "boxes in the lowest row of each"),
@@ -92,7 +92,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "tower",
-        summary: "one stack of boxes, straight or zigzag, with a light or heavy top: it stands up to an offset of 0.2 m",
+        summary: "a stack of boxes, straight or zigzag, light or heavy top: it stands up to an offset of 0.2 m",
         parameters: &[
             Parameter::whole("n", 10, (1.0, 10_000.0), "number of boxes"),
             Parameter::real("offset", 0.0, (0.0, 0.5), "shift of the boxes in x, one way and the other in turn [m]"),
@@ -104,7 +104,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "wall",
-        summary: "a wall of bricks in running bond, half bricks at the ends of every other row: it stands",
+        summary: "a wall of bricks in running bond with half bricks at the ends: it stands",
         parameters: &[
             Parameter::whole("rows", 20, (1.0, 1900.0), "rows of bricks"),
             Parameter::whole("columns", 20, (1.0, 1900.0), "bricks in a row without half bricks"),
@@ -115,14 +115,14 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "drop",
-        summary: "one of every shape falls on a half-space, a triangle mesh and a height field: each rests where it fell",
+        summary: "one of every shape falls on a half-space, a mesh and a height field: each rests where it fell",
         parameters: &[Parameter::real("height", 2.0, (0.0, 20.0), "height of the fall [m]")],
         bodies: |_| 7.0,
         build: |v| drop::drop(v[0] as f32),
     },
     Entry {
         name: "sphere-plane",
-        summary: "a ball falls on a half-space: it comes to rest there",
+        summary: "a ball falls on a half-space: it rests there",
         parameters: &[Parameter::real("height", 2.0, (0.0, 100.0), "height of the fall [m]")],
         bodies: |_| 1.0,
         build: |v| Ok(basics::sphere_plane(v[0] as f32)),
@@ -136,14 +136,14 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "coins",
-        summary: "a straight stack of flat cylinders, 1 m wide and 4 cm thick: it stands",
+        summary: "a straight stack of cylinders, 1 m wide and 4 cm thick: it stands",
         parameters: &[Parameter::whole("n", 60, (1.0, 10_000.0), "number of coins")],
         bodies: |v| v[0],
         build: |v| Ok(stacks::coins(v[0] as usize)),
     },
     Entry {
         name: "misaligned",
-        summary: "a stack of cubes, each off the axis by a fixed random shift: it stands",
+        summary: "a stack of cubes with fixed random shifts: it stands",
         parameters: &[CUBES, Parameter::real("offset", 0.1, (0.0, 0.5), "largest shift along x and along z [m]")],
         bodies: |v| v[0],
         build: |v| Ok(stacks::misaligned(v[0] as usize, v[1])),
@@ -164,21 +164,21 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "rolling",
-        summary: "balls on a plate that is pushed over the ground: they roll in the direction of the push, as theory predicts",
+        summary: "balls on a plate pushed over the ground: they roll in the direction of the push, as theory predicts",
         parameters: &[Parameter::real("angle", 60.0, (0.0, 360.0), "direction of the push, from x to z [degrees]")],
         bodies: |_| 26.0,
         build: |v| Ok(basics::rolling(v[0] as f32)),
     },
     Entry {
         name: "throw",
-        summary: "a ball is thrown at a stack of cubes: the stack stands until it is hit, then it falls",
+        summary: "a ball is thrown at a stack of cubes: the stack stands until hit, then falls",
         parameters: &[CUBES, Parameter::real("speed", 20.0, (5.0, 100.0), "horizontal speed of the ball [m/s]")],
         bodies: |v| v[0] + 1.0,
         build: |v| Ok(basics::throw(v[0] as usize, v[1] as f32)),
     },
     Entry {
         name: "tallest",
-        summary: "towers of step, 2 step, ... n cubes: the report names the highest tower that stands",
+        summary: "towers of step, 2 step, ... n cubes: the report names the highest that stands",
         parameters: &[
             Parameter::whole("n", 30, (1.0, 2000.0), "cubes of the tallest tower"),
             Parameter::whole("step", 2, (1.0, 2000.0), "how many more cubes each tower has; at most n"),
@@ -191,7 +191,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "mass-ratio",
-        summary: "a stack of alternating light and heavy cubes, the lowest light: it stands with 1.5 mm overlap, 0.01 mm with substeps=32",
+        summary: "light and heavy cubes in turn, the lowest light: they stand with 1.5 mm overlap, 0.01 mm with substeps=32",
         parameters: &[
             CUBES,
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the heavy cubes relative to the light ones"),
@@ -202,7 +202,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "pendulum",
-        summary: "a ball swings from a joint: it comes back to its height",
+        summary: "a ball swings from a joint: back to its height",
         parameters: &[
             Parameter::real("length", 1.0, (0.1, 100.0), "distance from the joint to the center of the ball [m]"),
             LIFTED,
@@ -212,7 +212,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "chain",
-        summary: "a chain with a heavy end swings: its joints stay closed, energy does not grow",
+        summary: "a chain with a heavy end swings: joints stay closed, energy does not grow",
         parameters: &[
             Parameter::whole("links", 20, (1.0, 10_000.0), "number of links"),
             Parameter::real("ratio", 10.0, (1e-6, 1e6), "mass of the end relative to a link"),
@@ -251,21 +251,21 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "four-bar",
-        summary: "a motor turns a crank, and a coupler swings a rocker: it stays within the angles that follow from the lengths",
+        summary: "a motor turns a crank, a coupler swings a rocker: it stays within the angles that follow from the lengths",
         parameters: &[Parameter::real("speed", 6.0, (-20.0, 20.0), "speed of the crank [rad/s]")],
         bodies: |_| 3.0,
         build: |v| Ok(machines::four_bar(v[0] as f32)),
     },
     Entry {
         name: "drawbridge",
-        summary: "two winches pull up a deck with a crate on it: at their speed, to the limit of its hinge",
+        summary: "two winches pull up a deck with a crate: at their speed, to the limit of its hinge",
         parameters: &[Parameter::real("load", 100.0, (0.0, 1000.0), "mass of the crate [kg]")],
         bodies: |_| 2.0,
         build: |v| Ok(machines::drawbridge(v[0] as f32)),
     },
     Entry {
         name: "car",
-        summary: "a car on sprung wheels drives over bumps: it reaches its speed and stays upright",
+        summary: "a car on sprung wheels drives over bumps: it reaches its speed, upright",
         parameters: &[
             Parameter::real("speed", 5.0, (0.0, 20.0), "speed that its motors turn the wheels for [m/s]"),
             Parameter::real(
@@ -280,7 +280,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "vehicle",
-        summary: "a vehicle with four sprung and driven wheels drives a circle over hills: it stays upright",
+        summary: "a vehicle on four sprung, driven wheels circles over hills: it stays upright",
         parameters: &[
             Parameter::real("speed", 6.0, (0.0, 30.0), "speed that its motors turn the wheels for [m/s]"),
             Parameter::real(
@@ -298,35 +298,35 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "course",
-        summary: "stairs, a ramp, a turntable, crates and a steep slope: a character walks from one end to the other",
+        summary: "stairs, a ramp, a turntable, crates and a steep slope: a character walks from end to end",
         parameters: &[Parameter::real("spin", 0.5, (-3.0, 3.0), "angular speed of the turntable [rad/s]")],
         bodies: |_| 3.0,
         build: |v| Ok(course::course(v[0] as f32)),
     },
     Entry {
         name: "ragdoll",
-        summary: "n ragdolls fall down stairs: joints stay closed and within their limits, all come to rest",
+        summary: "n ragdolls fall down stairs: joints stay closed and within limits, all rest",
         parameters: &[Parameter::whole("n", 1, (1.0, 1000.0), "number of ragdolls")],
         bodies: |v| 11.0 * v[0],
         build: |v| Ok(machines::ragdoll(v[0] as usize)),
     },
     Entry {
         name: "ragdolls",
-        summary: "n ragdolls, each turned another way, fall on the floor: all come to rest and sleep",
+        summary: "n ragdolls, each turned another way, fall on the floor: all sleep",
         parameters: &[Parameter::whole("n", 20, (1.0, 1000.0), "number of ragdolls")],
         bodies: |v| 11.0 * v[0],
         build: |v| Ok(machines::ragdolls(v[0] as usize)),
     },
     Entry {
         name: "press",
-        summary: "a press stands inside of a crate on the floor: the crate is held and lies still",
+        summary: "a press inside a crate on the floor: the crate is held and lies still",
         parameters: &[Parameter::real("depth", 0.05, (0.0, 0.4), "how deep the press is in the crate [m]")],
         bodies: |_| 1.0,
         build: |v| Ok(machines::press(v[0] as f32)),
     },
     Entry {
         name: "arch",
-        summary: "a semicircular arch of wedges without mortar, mu 0.6: it stands from a thickness of 0.12 of the radius on",
+        summary: "a semicircle of wedges without mortar, mu 0.6: it stands from a thickness of 0.12 of the radius on",
         parameters: &[
             Parameter::whole("voussoirs", 17, (3.0, 201.0), "number of wedges"),
             Parameter::real("thickness", 0.15, (0.05, 0.5), "thickness relative to the mean radius"),
@@ -336,7 +336,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "card-house",
-        summary: "pairs of thin plates lean against each other, and plates across them carry the next storey: the house stands",
+        summary: "pairs of thin plates lean against each other, plates across them carry the next storey: the house stands",
         parameters: &[
             Parameter::whole("storeys", 3, (1.0, 100.0), "number of storeys"),
             Parameter::real("angle", 20.0, (5.0, 45.0), "lean of the cards from the vertical [degrees]"),
@@ -353,14 +353,14 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "aqueduct",
-        summary: "arches of wedges side by side on piers of loose blocks, slabs on their crowns, no mortar: it stands",
+        summary: "arches of wedges on piers of loose blocks, slabs on their crowns, no mortar: it stands",
         parameters: &[Parameter::whole("arches", 4, (1.0, 1000.0), "number of arches")],
         bodies: |v| 4.0 * (v[0] - 1.0) + 11.0 * v[0],
         build: |v| masonry::aqueduct(v[0] as usize),
     },
     Entry {
         name: "kapla",
-        summary: "a tower of equal planks, in each storey nine on end and six across: it stands",
+        summary: "a tower of equal planks, each storey nine on end and six across: it stands",
         parameters: &[Parameter::whole("storeys", 7, (1.0, 1000.0), "number of storeys")],
         bodies: |v| 15.0 * v[0],
         build: |v| Ok(masonry::kapla(v[0] as usize)),
@@ -374,7 +374,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "pyramid-heavy",
-        summary: "a plane pyramid of cubes with a heavy one on its tip: it stands",
+        summary: "a plane pyramid of cubes, a heavy one on its tip: it stands",
         parameters: &[
             Parameter::whole("base", 10, (1.0, 2800.0), "cubes in the lowest row"),
             Parameter::real("ratio", 100.0, (1e-6, 1e6), "density of the cube on the tip relative to the others"),
@@ -384,7 +384,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "drum",
-        summary: "boxes in a hollow drum that turns about a horizontal axis: none leaves",
+        summary: "boxes in a drum that turns about a horizontal axis: none leaves",
         parameters: &[
             Parameter::whole("n", 200, (1.0, 1_000_000.0), "number of boxes"),
             Parameter::real("speed", 1.0, (-10.0, 10.0), "angular speed [rad/s]"),
@@ -394,7 +394,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "conveyor",
-        summary: "boxes come onto driven rollers, ride along at their speed, fall off the end and leave: as many leave as come",
+        summary: "boxes ride along driven rollers at their speed, fall off the end and leave: as many leave as come",
         parameters: &[
             Parameter::real("length", 8.0, (2.0, 1000.0), "length of the conveyor [m]"),
             Parameter::real("speed", 1.0, (0.1, 2.5), "speed of the tops of the rollers [m/s]"),
@@ -405,7 +405,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "turnstile",
-        summary: "balls roll down a channel and push a cross of four arms on its hinge: one passes in a quarter turn, and all in the end",
+        summary: "balls roll down a channel and push a cross of four arms: one passes in a quarter turn, all in the end",
         parameters: &[
             Parameter::whole("n", 12, (1.0, 1e6), "number of balls"),
             Parameter::whole("every", 60, (40.0, 1e6), "steps from one ball to the next"),
@@ -415,7 +415,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "galton",
-        summary: "balls fall past rows of pins into bins, and sensors count them: every ball passes the gate and ends in a bin",
+        summary: "balls fall past pins into bins, and sensors count them: every ball passes the gate and ends in a bin",
         parameters: &[
             Parameter::whole("n", 60, (1.0, 1000.0), "number of balls"),
             Parameter::whole("rows", 8, (2.0, 50.0), "rows of pins; one bin more"),
@@ -438,7 +438,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "bullets",
-        summary: "balls of 2 cm, marked as swept, fly to and fro in a room of sheets of 1 mm: none leaves",
+        summary: "balls of 2 cm, marked as swept, fly in a room of sheets of 1 mm: none leaves",
         parameters: &[
             Parameter::whole("n", 64, (1.0, 10_000.0), "number of balls"),
             Parameter::real("speed", 300.0, (1.0, 1000.0), "speed of each at the start [m/s]"),
@@ -449,7 +449,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "family",
-        summary: "a random world with an outcome known from statics or a closed form, as `drystone hard --families` judges",
+        summary: "a random world with a known outcome, as `drystone hard --families` judges",
         parameters: &[
             Parameter::word("kind", &Family::NAMES, "family of worlds"),
             Parameter::whole("seed", 1, (0.0, (1_u64 << 53) as f64), "seed of all that is drawn"),

@@ -11,8 +11,11 @@ use crate::report::prose::wrapped_page;
 
 pub(super) fn findings(rows: &Rows) -> String {
     [
-        ("Other engines", "engines-1.csv, engines-2.csv", beside(&rows.engines)),
-        ("Slowest steps", "engines-1.csv, engines-2.csv", stalls(&rows.engines)),
+        (
+            "Other engines",
+            "engines-1.csv, engines-2.csv",
+            format!("{}\n\n{}", beside(&rows.engines), stalls(&rows.engines)),
+        ),
         ("Stages of a step, falling and at rest", "falling.csv", stages(&rows.falling)),
         ("One island of any size", "growth.csv", growth(&rows.growth)),
         ("Sweeps and hardware limits", "limits.csv", limits(&rows.limits)),
@@ -55,8 +58,8 @@ fn beside(rows: &[WindowRow]) -> String {
     };
     let overlap = own().filter_map(to_least).fold(0.0, f64::max);
     format!(
-        "In the thirds of all scenes, {OWN} needs {} of the time of the fastest other engine. Its mean overlap is \
-         at most {} of the least mean overlap of the other engines in the same third.",
+        "In all thirds, {OWN} needs {} of the time of the fastest other engine. Its mean overlap is at most {} of the \
+         least mean overlap of the others.",
         times.collect::<Vec<_>>().join(" and "),
         number(overlap)
     )
@@ -70,8 +73,8 @@ fn stalls(rows: &[WindowRow]) -> String {
     };
     let first = |r: &WindowRow| if r.from == 1 { r.ms_first / r.ms } else { 0.0 };
     format!(
-        "The slowest step of a third takes at most {} times the median of the third. The first step takes at most {} \
-         times the median of the first third, because it computes all pairs and colors and allocates all memory.",
+        "The slowest later step takes at most {} times the median of its third. The first step takes at most {} times \
+         that, because it computes all pairs and colors and allocates all memory.",
         name(largest(|r| r.ms_worst / r.ms)),
         name(largest(first))
     )
@@ -83,7 +86,7 @@ fn stages(rows: &[FallingRow]) -> String {
     let Some(most) = rows.iter().map(key).max() else { return String::new() };
     let shown: Vec<_> = rows.iter().filter(|r| key(r) == most).collect();
     let mut text = format!(
-        "Medians of {}, {}, times in ms. A manifold has the contact points of two shapes.\n\n\
+        "Medians of {}, {}, in ms:\n\n\
          | steps | step | detection | colors | rows | sweeps | store | pairs recomputed | manifolds |\n\
          |---|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         shown[0].scene,
@@ -102,9 +105,8 @@ fn stages(rows: &[FallingRow]) -> String {
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The time of the sweeps is the least of the stage `run` per manifold and pass \
-         over all contacts, in parentheses relative to the smallest island. Bytes are the peak of the whole process. \
-         The other times are in ms, on the threads of their row.\n\n\
+        "A plane pyramid is one island. The time of the sweeps is the least of the stage `run`, in parentheses \
+         relative to the smallest island. Bytes are the peak of the process. Other times are in ms.\n\n\
          | boxes | sweeps, ns per manifold and pass | bytes a box | threads | step | detection | rows | sweeps |\n\
          |--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
@@ -126,11 +128,10 @@ fn growth(rows: &[GrowthRow]) -> String {
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
-        "One sweep over a point with friction between two cubes takes {OPERATIONS} scalar operations, counted by an \
-         instrumented number type. Bytes are those that the SIMD lanes read and write, in parentheses those of the \
-         kernels over plain rows, which load a body for each of its contacts. The triad is a = b + s c over the MiB \
-         that the lanes hold; bodies in a cache can exceed 100 % of it. The peak is that of multiplications and \
-         additions on registers.\n\n\
+        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. The \
+         bytes are those of the SIMD lanes, in parentheses those of the kernels over plain rows, which load a body for \
+         each contact. The triad is a = b + s c over the MiB that the lanes hold; bodies in a cache can exceed 100 % of \
+         it. The peak is that of multiplications and additions on registers.\n\n\
          | scene | MiB | threads | ns a manifold | bytes a manifold | million points a second | of the triad, GB/s | of the peak, G/s |\n\
          |---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
@@ -156,7 +157,7 @@ fn limits(rows: &[LimitRow]) -> String {
 
 fn worlds(rows: &[WorldsRow]) -> String {
     let mut text = String::from(
-        "Steps of single worlds per second, all worlds at rest, in parentheses relative to the best number of worlds:\n\n",
+        "Steps of single worlds at rest per second, in parentheses relative to the best number of worlds:\n\n",
     );
     for key in distinct(rows.iter().map(|r| (&r.scene, r.threads))) {
         let own = rows.iter().filter(|r| (&r.scene, r.threads) == key);
@@ -168,9 +169,9 @@ fn worlds(rows: &[WorldsRow]) -> String {
 
 fn states(rows: &[StatesRow]) -> String {
     let mut text = String::from(
-        "The pile is awake and at rest. A step is in ms; the other times are relative to it. `Rollback::push` copies \
-         a state into allocated memory, and `Simulation::restore` returns to it. `save` and `load` convert a state to \
-         and from bytes.\n\n\
+        "The pile is awake and at rest. A step is in ms; the other times are relative to it. `Rollback::push` copies a \
+         state into allocated memory, `Simulation::restore` returns to it, and `save` and `load` convert it to and \
+         from bytes.\n\n\
          | scene | threads | step | push | restore | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for r in rows {

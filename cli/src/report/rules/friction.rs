@@ -25,9 +25,9 @@ fn block_on_floor(velocity: Vec3, spin: f32, mu: f32) -> World {
 pub(super) fn friction(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Friction\n\nA block with mu 0.4 starts at 4 m/s at an angle to its edges. The table has its sliding distance, which is\n\
-         v²/(2 mu g) = {:.3} m by Coulomb's law. The axes of `box` are the tangents of the contact. *Creep* is the distance that\n\
-         a block with mu 0.5 moves in 10 s on a slope of 20°.\n\n\
+        "\n## Friction\n\nThe table has the sliding distance of a block with mu 0.4 that starts at 4 m/s at an angle to its edges, by Coulomb's\n\
+         law v²/(2 mu g) = {:.3} m. The axes of `box` are the tangents of the contact. *Creep* is the motion of a block with mu\n\
+         0.5 in 10 s on a slope of 20°.\n\n\
          | friction | 0° | 15° | 30° | 45° | largest spread | creep |\n|---|---|---|---|---|---|---|",
         16.0 / (2.0 * 0.4 * 9.81)
     );
@@ -74,8 +74,8 @@ fn spinning_plate(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Resu
     let _ = writeln!(
         report.page,
         "\nThe block starts at 2 m/s and 5 rad/s. Under Coulomb's law sliding and spinning end together, and the path bends,\n\
-         because friction acts below the center of mass and shifts the load forward. Friction per manifold lacks this effect,\n\
-         and sliding does not weaken its friction against the spin.\n\n\
+         because friction below the center of mass shifts the load forward. Friction per manifold lacks this effect, and\n\
+         sliding does not weaken its friction against the spin.\n\n\
          | friction | slides for | spins for | distance from its line |\n|---|---|---|---|"
     );
     let mut lines = Vec::new();

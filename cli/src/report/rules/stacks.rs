@@ -17,8 +17,8 @@ pub(super) fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
     let page = &mut report.page;
     let _ = writeln!(
         page,
-        "\n## Clamping\n\nThe scene `misaligned` runs for 20 s with {SHEET}.\n\
-         A stack falls when a box is half a box away from its start.\n\n\
+        "\n## Clamping\n\n`misaligned` runs for 20 s with {SHEET}. A stack\n\
+         falls when a box is half a box away from its start.\n\n\
          | boxes | clamping | stands | drift | rms speed |\n|---|---|---|---|---|"
     );
     for n in [5, 10, 20] {
@@ -28,7 +28,7 @@ pub(super) fn clamping(report: &mut RulesReport, after_run: &mut dyn FnMut()) ->
             ("accumulated, default settings", String::new()),
         ] {
             let Standing { fell, drift, rms_speed, .. } = stand(&format!("misaligned:n={n}"), &settings)?;
-            let stands = fell.map_or("20 s, to the end".into(), |time| format!("{time:.2} s"));
+            let stands = fell.map_or("20 s".into(), |time| format!("{time:.2} s"));
             let (drift, speed) = (drift * 1e3, rms_speed * 1e3);
             let _ = writeln!(page, "| {n} | {rule} | {stands} | {drift:.1} mm | {speed:.2} mm/s |");
             after_run();
@@ -50,8 +50,8 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
     let _ = writeln!(
         report.page,
         "\n## Stabilization\n\nA `tower` of 10 boxes runs for 20 s with 16 sweeps a step: one substep, or for `soft` 8 substeps of 1 + 1 sweeps.\n\
-         *Energy added* is the largest rise of kinetic and potential energy above an earlier minimum. *Exit speed* is the speed\n\
-         of a box that starts 5 cm deep in the floor.\n\n\
+         *Energy added* is the largest rise of energy above an earlier minimum. *Exit speed* is that of a box that starts 5 cm\n\
+         deep in the floor.\n\n\
          | stabilization | deepest after 1 s | after 20 s | energy added | rms speed at rest | exit speed |\n|---|---|---|---|---|---|"
     );
     for (rule, text) in STABILIZATIONS {
@@ -80,8 +80,7 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
     }
     report.page.push_str(
         "\nWithout stabilization the first overlap stays. Baumgarte stabilization removes it and shakes the tower. The soft\n\
-         contact first overlaps by its stiffness. Its preload (`preload_rate`), an offset of the spring, then lifts the tower,\n\
-         which adds the energy, and the tower rests.\n",
+         contact overlaps by its stiffness until its preload (`preload_rate`) lifts the tower to rest, which adds the energy.\n",
     );
     let title = "Deepest overlap in a tower of 10 boxes";
     report.picture("stabilization.svg", title, ("overlap mm", Scale::Decades), lines);
