@@ -177,28 +177,6 @@ fn a_body_that_a_step_took_out_of_range_touches_nothing() {
     }
 }
 
-/// The numbers of a body out of range mean nothing: it has no contact even where it touched to the end.
-#[test]
-fn a_body_that_left_the_range_leaves_its_contacts() {
-    for backend in BOTH {
-        let mut world = World::new();
-        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.0));
-        let ball = Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).friction(0.0).position(0.0, 0.5, 0.0);
-        world.add(ball);
-        world.bodies[1].force = Vec3::X * 9e8;
-        let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
-        let far = |simulation: &Simulation| simulation.world.bodies[1].position.x;
-        while far(&simulation) < 0.9e15 {
-            simulation.step(1.0).expect("a step");
-        }
-        assert_eq!(simulation.manifolds().count(), 1, "at {:e} m", far(&simulation));
-        while far(&simulation) < 1.1e15 {
-            simulation.step(1.0).expect("a step");
-        }
-        assert_eq!(simulation.manifolds().count(), 0, "at {:e} m", far(&simulation));
-    }
-}
-
 /// A cube lies as high as its present shape says.
 #[test]
 fn a_shape_that_changes_or_moves_within_its_body_carries_it_from_the_next_step_on() {
