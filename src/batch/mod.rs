@@ -282,7 +282,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Resets worlds to their start. Each has the bits of a world that never ran.
+    /// Resets worlds to their start, with the settings and [listeners](crate::Simulation::listen) of that time. Each has
+    /// the bits of a world that never ran.
     ///
     /// # Errors
     /// Those of [`Self::step`].

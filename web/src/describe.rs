@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 /// Every scene with its parameters.
 pub fn catalogue() -> Value {
-    let parameter = |p: &Parameter| json!({"name": p.name, "default": p.default, "least": p.range.0, "most": p.range.1, "whole": p.whole, "summary": p.summary});
+    let parameter = |p: &Parameter| json!({"name": p.name, "default": p.default, "least": p.range.0, "most": p.range.1, "whole": p.whole, "words": p.words, "summary": p.summary});
     let scene = |e: &Entry| {
         let parameters: Vec<_> = e.parameters.iter().map(parameter).collect();
         json!({"name": e.name, "summary": e.summary, "parameters": parameters})
@@ -111,5 +111,11 @@ mod tests {
         let all = catalogue();
         assert_eq!(all.as_array().map(Vec::len), Some(CATALOGUE.len()));
         assert_eq!(all[0]["parameters"][0]["default"], json!(1000.0));
+        let parameter = |scene: &str| {
+            let entry = all.as_array().and_then(|all| all.iter().find(|entry| entry["name"] == scene));
+            entry.map(|entry| entry["parameters"][0].clone()).expect("a scene with a parameter")
+        };
+        assert_eq!(parameter("pile")["words"], json!([]));
+        assert_eq!(parameter("family")["words"][1], json!("leaned-towers"));
     }
 }
