@@ -221,3 +221,43 @@ macro_rules! lane {
     };
 }
 use lane;
+
+/// Rows to lanes and back, of a type with four registers of four numbers: `$loaded` loads a register, `$stored` stores
+/// one to an aligned address, and `$transposed` transposes four.
+#[cfg(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128")))]
+macro_rules! four_registers {
+    ($loaded:ident, $stored:ident, $transposed:ident) => {
+        #[inline(always)]
+        unsafe fn columns(rows: &[*const f32; WIDTH]) -> [Self; 8] {
+            let mut columns = [Self::constant(0.0); 8];
+            for half in 0..2 {
+                // SAFETY: the caller promises that eight numbers are at each of the addresses.
+                let r = lanes!(lane => unsafe { $loaded(rows[lane].add(4 * half)) });
+                for four in 0..4 {
+                    let part = $transposed([r[4 * four], r[4 * four + 1], r[4 * four + 2], r[4 * four + 3]]);
+                    for (k, column) in part.into_iter().enumerate() {
+                        columns[4 * half + k].0[four] = column;
+                    }
+                }
+            }
+            columns
+        }
+        #[inline(always)]
+        fn scattered(c: [Self; 8]) -> [Row8; WIDTH] {
+            let mut rows = [Row8::default(); WIDTH];
+            for half in 0..2 {
+                let c = [c[4 * half], c[4 * half + 1], c[4 * half + 2], c[4 * half + 3]];
+                for four in 0..4 {
+                    let part = $transposed([c[0].0[four], c[1].0[four], c[2].0[four], c[3].0[four]]);
+                    for (k, row) in part.into_iter().enumerate() {
+                        // SAFETY: room for four numbers is at the address, which is aligned as half of a row.
+                        unsafe { $stored(rows[4 * four + k].0.as_mut_ptr().add(4 * half), row) };
+                    }
+                }
+            }
+            rows
+        }
+    };
+}
+#[cfg(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128")))]
+use four_registers;

@@ -3,7 +3,7 @@
 
 use std::arch::wasm32::*;
 
-use super::{Lanes, Row8, WIDTH, Wide, lane, lanes};
+use super::{Lanes, Row8, WIDTH, Wide, four_registers, lane, lanes};
 use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 
 /// Four registers.
@@ -65,37 +65,7 @@ impl Lanes for Simd128 {
         }
         to
     }
-    #[inline(always)]
-    unsafe fn columns(rows: &[*const f32; WIDTH]) -> [Self; 8] {
-        let zero = f32x4_splat(0.0);
-        let mut columns = [Self([zero; 4]); 8];
-        for half in 0..2 {
-            // SAFETY: the caller promises that eight numbers are at each of the addresses.
-            let r: [v128; WIDTH] = lanes!(lane => unsafe { v128_load(rows[lane].add(4 * half).cast()) });
-            for four in 0..4 {
-                let part = transposed([r[4 * four], r[4 * four + 1], r[4 * four + 2], r[4 * four + 3]]);
-                for (k, column) in part.into_iter().enumerate() {
-                    columns[4 * half + k].0[four] = column;
-                }
-            }
-        }
-        columns
-    }
-    #[inline(always)]
-    fn scattered(c: [Self; 8]) -> [Row8; WIDTH] {
-        let mut rows = [Row8::default(); WIDTH];
-        for half in 0..2 {
-            let c = [c[4 * half], c[4 * half + 1], c[4 * half + 2], c[4 * half + 3]];
-            for four in 0..4 {
-                let part = transposed([c[0].0[four], c[1].0[four], c[2].0[four], c[3].0[four]]);
-                for (k, row) in part.into_iter().enumerate() {
-                    // SAFETY: room for eight numbers is at the address.
-                    unsafe { v128_store(rows[4 * four + k].0.as_mut_ptr().add(4 * half).cast(), row) };
-                }
-            }
-        }
-        rows
-    }
+    four_registers!(loaded, stored, transposed);
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self(each!(f32x4_sqrt; self.0))
@@ -114,6 +84,20 @@ impl Lanes for Simd128 {
         let steps = [i32x4_splat(steps); 4];
         Self(each!(i32x4_sub; self.0, steps))
     }
+}
+
+/// Four numbers at an address.
+#[inline(always)]
+unsafe fn loaded(from: *const f32) -> v128 {
+    // SAFETY: the caller's promise; a load needs no alignment.
+    unsafe { v128_load(from.cast()) }
+}
+
+/// Stores four numbers to an address.
+#[inline(always)]
+unsafe fn stored(to: *mut f32, x: v128) {
+    // SAFETY: the caller's promise.
+    unsafe { v128_store(to.cast(), x) }
 }
 
 /// Transposes four rows to four columns.

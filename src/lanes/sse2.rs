@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Lanes, Row8, WIDTH, Wide, lane, lanes};
+use super::{Lanes, Row8, WIDTH, Wide, four_registers, lane, lanes};
 use crate::math::{EXPONENT, INVERSE_SQRT_GUESS, Lane, OPPOSITE_EXPONENT};
 
 /// Four registers.
@@ -82,35 +82,7 @@ impl Lanes for Sse2 {
         }
         to
     }
-    #[inline(always)]
-    unsafe fn columns(rows: &[*const f32; WIDTH]) -> [Self; 8] {
-        let mut columns = [Self::constant(0.0); 8];
-        for half in 0..2 {
-            // SAFETY: the caller promises that eight numbers are at each of the addresses.
-            let r: [__m128; WIDTH] = lanes!(lane => unsafe { _mm_loadu_ps(rows[lane].add(4 * half)) });
-            for four in 0..4 {
-                let part = transposed([r[4 * four], r[4 * four + 1], r[4 * four + 2], r[4 * four + 3]]);
-                for (k, column) in part.into_iter().enumerate() {
-                    columns[4 * half + k].0[four] = column;
-                }
-            }
-        }
-        columns
-    }
-    #[inline(always)]
-    fn scattered(c: [Self; 8]) -> [Row8; WIDTH] {
-        let mut rows = [Row8::default(); WIDTH];
-        for half in 0..2 {
-            let c = [c[4 * half], c[4 * half + 1], c[4 * half + 2], c[4 * half + 3]];
-            for four in 0..4 {
-                let part = transposed([c[0].0[four], c[1].0[four], c[2].0[four], c[3].0[four]]);
-                for (k, row) in part.into_iter().enumerate() {
-                    unsafe { _mm_store_ps(rows[4 * four + k].0.as_mut_ptr().add(4 * half), row) };
-                }
-            }
-        }
-        rows
-    }
+    four_registers!(loaded, stored, transposed);
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self(each!(_mm_sqrt_ps; self.0))
@@ -129,6 +101,18 @@ impl Lanes for Sse2 {
         let steps = [steps; 4];
         Self(each!(floats_below; self.0, steps))
     }
+}
+
+/// Four numbers at an address.
+#[inline(always)]
+unsafe fn loaded(from: *const f32) -> __m128 {
+    unsafe { _mm_loadu_ps(from) }
+}
+
+/// Stores four numbers to an aligned address.
+#[inline(always)]
+unsafe fn stored(to: *mut f32, x: __m128) {
+    unsafe { _mm_store_ps(to, x) }
 }
 
 /// Transposes four rows to four columns.

@@ -21,6 +21,16 @@ fn ball(x: f32, y: f32) -> Body {
     Body::dynamic().shape(Shape::ball(0.5)).position(x, y, 0.0)
 }
 
+/// Eight balls on the ground, 2 m apart.
+fn row_of_balls() -> World {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    for i in 0..8 {
+        world.add(ball(2.0 * i as f32, 0.5));
+    }
+    world
+}
+
 /// Rows of the contacts of a body.
 fn rows(simulation: &mut Simulation, body: u32) -> Vec<u32> {
     let (problem, _) = simulation.next_problem(DT).expect("a step");
@@ -33,12 +43,7 @@ fn rows(simulation: &mut Simulation, body: u32) -> Vec<u32> {
 
 #[test]
 fn a_contact_stays_in_its_row_while_others_come_and_go() {
-    let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    for i in 0..8 {
-        world.add(ball(2.0 * i as f32, 0.5));
-    }
-    let mut simulation = simulation(world);
+    let mut simulation = simulation(row_of_balls());
     run(&mut simulation, 10);
     let before = rows(&mut simulation, 8);
     for body in 1..4 {
@@ -52,12 +57,8 @@ fn a_contact_stays_in_its_row_while_others_come_and_go() {
 /// The last pair takes the place of one that ended, also where nothing of it moves.
 #[test]
 fn a_sleeping_contact_keeps_its_points_while_another_ends() {
-    let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    for i in 0..8 {
-        world.add(ball(2.0 * i as f32, 0.5));
-    }
-    let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+    let mut simulation =
+        Simulation::with(row_of_balls(), SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
     run(&mut simulation, 120);
     // Points of the contacts of the other balls.
     let points = |simulation: &Simulation| {

@@ -79,14 +79,14 @@ function parameters() {
     element("parameters"),
     (entry?.parameters ?? []).map((p) => {
       const given = chosen.parameters[p.name] ?? p.default;
+      const about = { prefix: "parameter", name: p.name, summary: sentence(p.summary) };
       if (p.words.length > 0) {
         // A link may have the number of a word.
-        const [value, usual] = [p.words[given] ?? given, p.words[p.default]];
-        const about = { prefix: "parameter", name: p.name, summary: sentence(p.summary) };
-        return fields.field({ ...about, value, words: p.words, isChanged: value !== usual }, changed(p.name));
+        const value = p.words[given] ?? given;
+        return fields.field({ ...about, value, words: p.words, isChanged: value !== p.words[p.default] }, changed(p.name));
       }
       const value = Number(given);
-      const about = { prefix: "parameter", name: p.name, summary: `${sentence(p.summary)} From ${numbers.plain(p.least)} to ${numbers.plain(p.most)}.` };
+      about.summary += ` From ${numbers.plain(p.least)} to ${numbers.plain(p.most)}.`;
       return fields.field({ ...about, value, slider: fields.slider(p), isChanged: value !== p.default }, changed(p.name));
     }),
   );
