@@ -68,9 +68,8 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     Ok(format!(
         "# Hard cases\n\n\
          `drystone hard --page docs` makes this page, `drystone hard --case H3 --preset accurate` runs one case, and\n\
-         `drystone hard --list` describes all. Columns are presets with their substeps: `cpu` (lanes, single precision), `f64`\n\
-         (reference) and `gpu` (shaders). Failures are bold. Quantities that are 0 and pass in every column are left out. The\n\
-         adapter is\n\
+         `drystone hard --list` describes all. Columns are presets (substeps) on `cpu` (lanes, single precision), `f64`\n\
+         (reference) or `gpu` (shaders). Failures are bold. Quantities that pass with 0 everywhere are left out. The adapter is\n\
          {gpu}.\n\n\
          | case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{}",
         heads.join(" | "),

@@ -58,8 +58,8 @@ fn beside(rows: &[WindowRow]) -> String {
     };
     let overlap = own().filter_map(to_least).fold(0.0, f64::max);
     format!(
-        "In all thirds, {OWN} needs {} of the time of the fastest other engine. Its mean overlap is at most {} of the \
-         least mean overlap of the others.",
+        "In all thirds, {OWN} needs {} of the fastest other engine's time. Its mean overlap is at most {} of the least \
+         mean overlap of the others.",
         times.collect::<Vec<_>>().join(" and "),
         number(overlap)
     )
@@ -73,8 +73,8 @@ fn stalls(rows: &[WindowRow]) -> String {
     };
     let first = |r: &WindowRow| if r.from == 1 { r.ms_first / r.ms } else { 0.0 };
     format!(
-        "The slowest later step takes at most {} times the median of its third. The first step takes at most {} times \
-         that, because it computes all pairs and colors and allocates all memory.",
+        "The slowest later step takes at most {} times its third's median. The first step takes at most {} times that: \
+         it computes all pairs and colors and allocates all memory.",
         name(largest(|r| r.ms_worst / r.ms)),
         name(largest(first))
     )
@@ -105,8 +105,8 @@ fn stages(rows: &[FallingRow]) -> String {
 
 fn growth(rows: &[GrowthRow]) -> String {
     let mut text = String::from(
-        "A plane pyramid is one island. The time of the sweeps is the least of the stage `run`, in parentheses \
-         relative to the smallest island. Bytes are the peak of the process. Other times are in ms.\n\n\
+        "A plane pyramid is one island. Sweep time is the least of the stage `run` (in parentheses: relative to the \
+         smallest island). Bytes are the process's peak. Other times are in ms.\n\n\
          | boxes | sweeps, ns per manifold and pass | bytes a box | threads | step | detection | rows | sweeps |\n\
          |--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
@@ -128,10 +128,10 @@ fn growth(rows: &[GrowthRow]) -> String {
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
-        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. The \
-         bytes are those of the SIMD lanes, in parentheses those of the kernels over plain rows, which load a body for \
-         each contact. The triad is a = b + s c over the MiB that the lanes hold; bodies in a cache can exceed 100 % of \
-         it. The peak is that of multiplications and additions on registers.\n\n\
+        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. Bytes \
+         are those of the SIMD lanes (in parentheses: of the kernels over plain rows, which load a body for each \
+         contact). The triad is a = b + s c over the MiB that the lanes hold; cached bodies can exceed 100 % of it. \
+         The peak is for multiplications and additions on registers.\n\n\
          | scene | MiB | threads | ns a manifold | bytes a manifold | million points a second | of the triad, GB/s | of the peak, G/s |\n\
          |---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
@@ -157,7 +157,7 @@ fn limits(rows: &[LimitRow]) -> String {
 
 fn worlds(rows: &[WorldsRow]) -> String {
     let mut text = String::from(
-        "Steps of single worlds at rest per second, in parentheses relative to the best number of worlds:\n\n",
+        "Steps of single worlds at rest per second (in parentheses: relative to the best number of worlds):\n\n",
     );
     for key in distinct(rows.iter().map(|r| (&r.scene, r.threads))) {
         let own = rows.iter().filter(|r| (&r.scene, r.threads) == key);
@@ -169,7 +169,7 @@ fn worlds(rows: &[WorldsRow]) -> String {
 
 fn states(rows: &[StatesRow]) -> String {
     let mut text = String::from(
-        "The pile is awake and at rest. A step is in ms; the other times are relative to it. `Rollback::push` copies a \
+        "The pile is awake and at rest. A step is in ms; other times are relative to it. `Rollback::push` copies a \
          state into allocated memory, `Simulation::restore` returns to it, and `save` and `load` convert it to and \
          from bytes.\n\n\
          | scene | threads | step | push | restore | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
