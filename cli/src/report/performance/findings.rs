@@ -73,8 +73,8 @@ fn stalls(rows: &[WindowRow]) -> String {
     };
     let first = |r: &WindowRow| if r.from == 1 { r.ms_first / r.ms } else { 0.0 };
     format!(
-        "The slowest later step takes at most {} times its third's median. The first step takes at most {} times that: \
-         it computes all pairs and colors and allocates all memory.",
+        "The slowest later step takes at most {} times its third's median. The first step takes at most {} times that, \
+         because it computes all pairs and colors and allocates all memory.",
         name(largest(|r| r.ms_worst / r.ms)),
         name(largest(first))
     )
