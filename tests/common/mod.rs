@@ -6,6 +6,7 @@ pub mod gpu;
 #[macro_use]
 pub mod harness;
 pub mod measurement;
+pub mod sample;
 pub mod state;
 pub mod tolerance;
 

@@ -6,6 +6,7 @@ mod common {
     pub mod contacts;
     pub mod counting;
     pub mod efforts;
+    pub mod sample;
     pub mod settings;
     pub mod state;
 

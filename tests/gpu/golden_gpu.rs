@@ -7,6 +7,7 @@ mod scenes;
 mod table;
 
 use crate::common::gpu;
+use crate::common::sample::one_in;
 use drystone::backend::gpu::GpuOptions;
 use drystone::{Backend, Gpu};
 
@@ -20,13 +21,13 @@ tests! {
 }
 
 fn exact_mode_has_the_golden_hashes() {
-    have_the_golden_hashes(gpu::exact(), 1);
+    have_the_golden_hashes(gpu::exact(), one_in(3));
 }
 
 fn steered_wgsl_has_golden_hashes() {
     let options = GpuOptions { exact: true, steered: true, ..GpuOptions::default() };
-    // Every third scene: its shaders take long to compile.
-    have_the_golden_hashes(Gpu::open(options).expect("an adapter"), 3);
+    // Fewer scenes: the driver takes twice as long to compile these shaders.
+    have_the_golden_hashes(Gpu::open(options).expect("an adapter"), 3 * one_in(3));
 }
 
 fn have_the_golden_hashes(gpu: impl Backend + 'static, step: usize) {

@@ -7,6 +7,7 @@ mod settings;
 
 use crate::common::difference::of_velocities;
 use crate::common::gpu;
+use crate::common::sample::one_in;
 use crate::common::state::reference;
 use crate::common::tolerance;
 use drystone::backend::gpu::GpuOptions;
@@ -140,7 +141,7 @@ const RULES: [&[&str]; 17] = [
 const LANDED: u32 = 80;
 
 fn every_rule_has_the_bits_of_the_reference_in_exact_mode() {
-    for rule in RULES {
+    for rule in RULES.iter().step_by(one_in(2)) {
         let mut config = SolverConfig::default().without_sleep();
         rule.iter().for_each(|assignment| set(&mut config, assignment));
         assert_same(&mixture(), &config, LANDED, &rule.join(" "));

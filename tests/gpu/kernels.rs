@@ -4,6 +4,7 @@
 //! covering array: any three rules meet in every combination that they have. `drystone conform` runs all of them, in both modes and forms.
 
 use std::collections::HashSet;
+use std::sync::LazyLock;
 
 use crate::common::difference::{differing, largest};
 use crate::common::gpu;
@@ -96,30 +97,31 @@ fn triples(kernel: Kernel) -> HashSet<[(usize, u8); 3]> {
 
 /// Every kernel, of those with rules so many variants that any three rules have met in each combination that they have: always the one
 /// that brings most together that did not meet yet.
-fn tried() -> Vec<Kernel> {
-    let (mut waiting, mut chosen): (Vec<_>, Vec<_>) = every_kernel().into_iter().partition(|k| k.rules().is_some());
-    let mut met: HashSet<(&str, _)> = HashSet::new();
-    let of_kernel = |kernel: Kernel| triples(kernel).into_iter().map(move |triple| (kernel.name(), triple));
+static TRIED: LazyLock<Vec<Kernel>> = LazyLock::new(|| {
+    let (with_rules, mut chosen): (Vec<_>, Vec<_>) = every_kernel().into_iter().partition(|k| k.rules().is_some());
+    let named = |kernel: Kernel| triples(kernel).into_iter().map(move |triple| (kernel.name(), triple));
+    // Each with the combinations that did not meet yet.
+    let mut waiting: Vec<(Kernel, HashSet<_>)> =
+        with_rules.iter().map(|&kernel| (kernel, named(kernel).collect())).collect();
     loop {
-        waiting.retain(|&kernel| of_kernel(kernel).any(|triple| !met.contains(&triple)));
+        waiting.retain(|(_, new)| !new.is_empty());
         // The first of equals, so that it is the same in every run.
-        let new = |kernel: &Kernel| of_kernel(*kernel).filter(|triple| !met.contains(triple)).count();
-        let Some(best) = waiting.iter().copied().rev().max_by_key(new) else { return chosen };
-        met.extend(of_kernel(best));
+        let Some((best, met)) = waiting.iter().rev().max_by_key(|(_, new)| new.len()).cloned() else { return chosen };
+        waiting.iter_mut().for_each(|(_, new)| new.retain(|triple| !met.contains(triple)));
         chosen.push(best);
     }
-}
+});
 
 fn any_three_rules_meet_in_a_variant_that_is_tried() {
-    let (all, tried) = (every_kernel(), tried());
+    let (all, tried) = (every_kernel(), &*TRIED);
     let met = |kernels: &[Kernel]| -> HashSet<_> {
         kernels.iter().flat_map(|kernel| triples(*kernel).into_iter().map(|triple| (kernel.name(), triple))).collect()
     };
-    assert_eq!(met(&all), met(&tried));
+    assert_eq!(met(&all), met(tried));
     assert!(all.iter().filter(|kernel| kernel.rules().is_none()).all(|kernel| tried.contains(kernel)));
     let sweeps = |kernels: &[Kernel]| kernels.iter().filter(|k| matches!(k, Kernel::SolveContacts(_))).count();
-    measured!("{} of {} kernels, {} of {} sweeps", tried.len(), all.len(), sweeps(&tried), sweeps(&all));
-    assert!(sweeps(&tried) * 4 < sweeps(&all), "{} of {}", sweeps(&tried), sweeps(&all));
+    measured!("{} of {} kernels, {} of {} sweeps", tried.len(), all.len(), sweeps(tried), sweeps(&all));
+    assert!(sweeps(tried) * 4 < sweeps(&all), "{} of {}", sweeps(tried), sweeps(&all));
 }
 
 /// How the driver gets a kernel: a program for one color, or one that goes over all colors.
@@ -136,7 +138,7 @@ fn run_all(
     problems: &[StepProblem; 2],
     mut compare: impl FnMut(&StepProblem, &StepProblem, &str),
 ) {
-    for kernel in tried() {
+    for &kernel in TRIED.iter() {
         let problem = &problems[usize::from(has_patches(kernel))];
         let mut ways = ways_to_run(kernel, problem);
         let passes = match form {

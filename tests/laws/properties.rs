@@ -1,6 +1,6 @@
 //! The laws on random worlds, as tests. `cargo run --release --package drystone-laws` runs more of them.
 //!
-//! Of each group a test draws as many worlds as `DRYSTONE_LAWS` says, 12 unless told otherwise, and names those that break the law, each with
+//! Of each group a test draws as many worlds as `DRYSTONE_LAWS` says, 8 unless told otherwise, and names those that break the law, each with
 //! a scene file in the folder for temporary files. Tests of a law that does not hold yet are ignored, and say how often it is broken:
 //! `cargo test --test cpu laws -- --ignored` runs them.
 
@@ -15,7 +15,7 @@ use crate::laws::draw::{Drawn, Family, Kind};
 use crate::laws::run::{Case, Verdict, run_on};
 
 /// Worlds of each group.
-const WORLDS: u64 = 12;
+const WORLDS: u64 = 8;
 /// How long each of them runs (s).
 const SECONDS: f32 = 4.0;
 

@@ -4,10 +4,12 @@ use drystone::preset::Preset;
 use drystone::{Backend, Cpu};
 use drystone_cli::hard::{Case, Limit, Setup};
 
-fn all_short_cases_pass(preset: Preset) {
+use crate::common::sample::is_full;
+
+fn short_cases_pass(preset: Preset, is_run: fn(&Case) -> bool) {
     let open = || Ok(Box::new(Cpu::new()) as Box<dyn Backend>);
     let setup = Setup { config: preset.config().without_sleep(), open: &open };
-    for case in Case::ALL.iter().filter(|case| !case.long) {
+    for case in Case::ALL.iter().filter(|case| !case.long && is_run(case)) {
         let checks = case.run(&setup).expect(case.name);
         assert!(!checks.is_empty());
         let failed: Vec<_> = checks.into_iter().filter(|check| !check.passed).collect();
@@ -17,12 +19,13 @@ fn all_short_cases_pass(preset: Preset) {
 
 #[test]
 fn all_short_cases_pass_at_the_default() {
-    all_short_cases_pass(Preset::Balanced);
+    short_cases_pass(Preset::Balanced, |_| true);
 }
 
 #[test]
-fn all_short_cases_pass_with_32_substeps() {
-    all_short_cases_pass(Preset::Accurate);
+fn short_cases_pass_with_32_substeps() {
+    // These three take two thirds of the time.
+    short_cases_pass(Preset::Accurate, |case| is_full() || !["H22", "kapla", "rolling"].contains(&case.name));
 }
 
 #[test]

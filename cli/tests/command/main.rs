@@ -4,6 +4,7 @@
 #[path = "../../../tests/common"]
 mod common {
     pub mod contacts;
+    pub mod sample;
 }
 
 mod cli;
