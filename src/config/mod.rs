@@ -99,7 +99,7 @@ pub struct SolverConfig {
     /// How joints are solved. `auto` solves all joints of a connected set of bodies at once if that takes time in
     /// proportion to their number, as in chains, trees and single loops. It sweeps nets. Motors and springs are always
     /// swept. Measured with 8 substeps on a chain of 100 links with 1000 times the mass of a link at its end: the gap
-    /// is 0.22 of a link with sweeps, and 6e-5 of a link at once.
+    /// is 0.22 of a link with sweeps, and 5e-5 of a link at once.
     pub joint_solver: JointSolver,
     /// Joint stiffness: frequency of the undamped joint spring times the substep length.
     pub joint_frequency: f32,

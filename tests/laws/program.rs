@@ -109,7 +109,7 @@ impl Options {
                 "--shrink" => options.shrink = Some(value),
                 "--shrinks" => options.shrinks = number(&value)?,
                 "--out" => options.out = Some(value),
-                _ => return Err(format!("{name}: no such option; the first lines of tests/laws/main.rs name all")),
+                _ => return Err(format!("{name}: no such option; the first lines of tests/laws/program.rs name all")),
             }
         }
         for setting in &options.settings {
