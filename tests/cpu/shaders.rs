@@ -49,7 +49,7 @@ fn storage_buffers(reflected: &Reflected) -> usize {
 
 /// Names of the files of a folder of shaders.
 fn files(folder: &str) -> BTreeSet<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
     let entries = std::fs::read_dir(folder).expect("a folder of shaders").map(|e| e.expect("an entry").path());
     let shaders = entries.filter(|path| path.extension().is_some_and(|e| e == "wgsl"));
     shaders.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect()

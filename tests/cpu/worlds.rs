@@ -104,7 +104,10 @@ fn what_cannot_stand_beside_each_other_is_refused_in_one_line() {
         refusal("tower", 2, Some("offset")),
         "tower has no whole-number parameter \"offset\" to vary; it has: n"
     );
-    assert!(refusal("examples/two_boxes.json", 2, Some("n")).contains("being a file"));
+    assert!(
+        refusal(concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/two_boxes.json"), 2, Some("n"))
+            .contains("being a file")
+    );
     assert!(refusal("pile", 0, None).starts_with("0 worlds of 1000 dynamic bodies"));
     assert!(refusal("pile", 1_000_000, None).contains("at most 4000000 such bodies"));
     // The ends of ranges hold for every world.

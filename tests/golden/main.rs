@@ -43,7 +43,7 @@ fn assert_golden(what: &str, found: &[Row]) {
 fn the_reference_has_the_golden_hashes() {
     let found = rows_on(Box::new(Reference::<f32>::new()), 1);
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/hashes.txt");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/hashes.txt");
         return std::fs::write(path, text(&found)).expect("the file can be written");
     }
     assert_golden("reference", &found);

@@ -55,7 +55,7 @@ fn energy(simulation: &Simulation) -> f64 {
 
 #[test]
 fn every_scene_stands_on_the_page_of_pictures() {
-    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let page = std::fs::read_to_string(docs.join("gallery.md")).expect("the page");
     for entry in CATALOGUE {
         let section = format!("## {}\n\n{}\n", entry.name, entry.summary);
