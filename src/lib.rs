@@ -104,8 +104,3 @@ pub struct Readme;
 #[cfg(doctest)]
 #[doc = include_str!("../docs/library.md")]
 pub struct Library;
-
-/// The example of the page for users of other engines, likewise.
-#[cfg(doctest)]
-#[doc = include_str!("../docs/from-other-engines.md")]
-pub struct FromOtherEngines;

@@ -493,7 +493,7 @@ def maze(
     render_mode: str | None = None,
 ) -> VectorEnv:
     """Tilt a board so that a ball rolls to the goal and past the holes. `board` is easy, medium, hard or a file
-    (docs/maze.md).
+    (docs/pictures.md).
 
     Actions: the wanted tilts to the right and to the front; 1 is the steepest. The board rotates by at most 60 degrees
     a second. An action lasts 1/20 s. Observations: position of the ball on the board and its velocity (m, m/s), both

@@ -100,7 +100,7 @@ fn summary(section: &mut String, rows: &[Row], targets: &[&str]) {
 }
 
 fn times(section: &mut String, rows: &[Row], targets: &[&str]) {
-    section.push_str("\nMilliseconds, with iterations in parentheses (for drystone steps of Newton's method, 0 where sweeps sufficed):\n\n| problem | form | contacts |");
+    section.push_str("\nMilliseconds, and iterations (drystone: steps of Newton's method, 0 where sweeps sufficed):\n\n| problem | form | contacts |");
     for target in targets {
         let _ = write!(section, " drystone {target} | fastest of Siconos |");
     }
@@ -132,8 +132,8 @@ fn solved(section: &mut String, rows: &[Row], targets: &[&str]) -> Result<Vec<u8
     best.truncate(BEST);
 
     section.push_str(
-        "\nThe next table counts the problems that drystone and the best solvers of Siconos solve.\n\
-         [solvers.csv](convergence/solvers.csv) has all solvers. Global solvers take only global problems.\n\n| solver |",
+        "\nThe next table counts solved problems. [solvers.csv](convergence/solvers.csv) has all solvers. Global solvers take only\n\
+         global problems.\n\n| solver |",
     );
     targets.iter().for_each(|target| section.push_str(&format!(" {target} |")));
     section.push_str(" of |\n|---|");

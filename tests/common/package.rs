@@ -1,1 +1,0 @@
-//! Nothing: the tests stand in the binaries beside this file.
