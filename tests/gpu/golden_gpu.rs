@@ -26,7 +26,7 @@ fn exact_mode_has_the_golden_hashes() {
 
 fn steered_wgsl_has_golden_hashes() {
     let options = GpuOptions { exact: true, steered: true, ..GpuOptions::default() };
-    // Fewer scenes: the driver takes twice as long to compile these shaders.
+    // Fewer scenes: the driver takes nearly three times as long to compile these shaders.
     have_the_golden_hashes(Gpu::open(options).expect("an adapter"), 3 * one_in(5));
 }
 
