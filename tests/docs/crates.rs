@@ -15,7 +15,7 @@ fn crates(features: &[&str]) -> BTreeSet<String> {
 /// The same of another package.
 fn crates_of(package: &str, features: &[&str]) -> BTreeSet<String> {
     let mut command = Command::new(env!("CARGO"));
-    command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    command.current_dir(crate::ROOT);
     command.args(["tree", "--offline", "--package", package, "--edges", "normal", "--prefix", "none"]).args(features);
     let output = command.output().expect("cargo runs");
     let text = String::from_utf8(output.stdout).expect("text");

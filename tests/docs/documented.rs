@@ -181,7 +181,7 @@ fn texts_of(folder: &Path, texts: &mut BTreeMap<PathBuf, String>) {
 fn every_public_type_and_function_stands_in_an_example() {
     let (mut count, mut unshown) = (0, Vec::new());
     for folder in ["src", "scenes/src", "problems/src", "conform/src"] {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
+        let root = Path::new(crate::ROOT).join(folder);
         let mut texts = BTreeMap::new();
         texts_of(&root, &mut texts);
         let (own, without) = self::unshown(&root, &texts);

@@ -102,7 +102,7 @@ fn source_files(folder: &Path) -> Vec<PathBuf> {
 fn a_module_names_only_modules_of_its_own_floor_or_lower_ones() {
     let mut wrong = Vec::new();
     for (folder, _, floors) in PACKAGES {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
+        let root = Path::new(crate::ROOT).join(folder);
         for path in source_files(&root).into_iter().filter(|path| path.extension().is_some_and(|e| e == "rs")) {
             let inside = path.strip_prefix(&root).expect("found there");
             let module = inside.iter().next().expect("a name").to_string_lossy();

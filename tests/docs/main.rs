@@ -7,3 +7,6 @@ mod floors;
 mod names;
 mod pages;
 mod platform_functions;
+
+/// The folder of the workspace.
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");

@@ -208,7 +208,7 @@ fn is_page(path: &str) -> bool {
 #[test]
 fn every_name_that_a_page_prints_as_code_stands_in_the_sources() {
     let mut files = BTreeMap::new();
-    read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")), "", &mut files);
+    read(Path::new(crate::ROOT), "", &mut files);
     let sources = Sources::new(files);
     let (mut count, mut unknown) = (0, Vec::new());
     for (path, page) in sources.files.iter().filter(|(path, _)| is_page(path)) {

@@ -86,7 +86,7 @@ fn asked(code: &str) -> Vec<&'static str> {
 
 #[test]
 fn no_step_asks_the_platform_for_a_sine() {
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let root = Path::new(crate::ROOT);
     let (mut wrong, mut used) = (Vec::new(), vec![false; ALLOWED.len()]);
     let folders = ["src", "scenes/src", "problems/src", "conform/src"].map(|folder| source_files(&root.join(folder)));
     for path in folders.concat() {
