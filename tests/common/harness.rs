@@ -11,6 +11,7 @@ use libtest_mimic::{Arguments, Trial};
 
 use super::Open;
 use super::gpu::{self, Need};
+use super::sample::is_full;
 
 static ARGUMENTS: OnceLock<Arguments> = OnceLock::new();
 
@@ -106,6 +107,15 @@ pub fn every_backend(module: &str, name: &str, run: fn(Open)) -> Vec<Test> {
         test(module, &format!("{name}::{backend}"), needs, move || run(open))
     };
     vec![on("cpu", &[], || Box::new(Cpu::new())), on("gpu", &[Need::Adapter], || Box::new(gpu::plain()))]
+}
+
+/// The same; the one on the GPU, which takes seconds, runs at night. Every rule of the kernels has its test on the GPU by day.
+pub fn every_backend_the_gpu_at_night(module: &str, name: &str, run: fn(Open)) -> Vec<Test> {
+    let mut tests = every_backend(module, name, run);
+    if !is_full() {
+        tests.truncate(1);
+    }
+    tests
 }
 
 /// The same, and a third on the reference.

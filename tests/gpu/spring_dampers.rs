@@ -13,8 +13,10 @@ tests! {
         a_damper_slows_a_mass_by_its_constant,
         a_joint_that_is_off_holds_nothing_until_it_is_on,
         a_spring_between_two_bodies_swings_with_their_reduced_mass,
-        a_spring_of_a_stiffness_swings_with_the_mass_that_it_moves,
+    }
+    every_backend_the_gpu_at_night {
         a_torsion_spring_turns_a_rod_about_its_end,
+        a_spring_of_a_stiffness_swings_with_the_mass_that_it_moves,
     }
     no_gpu {
         bodies_of_a_joint_that_is_off_collide_and_wake,
