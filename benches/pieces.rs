@@ -1,4 +1,4 @@
-//! What the pieces of a step cost: detection, coloring and rows a manifold, each kernel a constraint and sweep.
+//! Costs of the pieces of a step: detection, coloring and rows a manifold, each kernel a constraint and sweep.
 //! Whole steps are what `drystone bench` measures.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};

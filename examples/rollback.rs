@@ -40,7 +40,7 @@ pub fn main() -> Result<()> {
     for now in 0..120 {
         rollback.push(&late);
         step(&mut late, now, &[0])?;
-        // What the second player did four steps ago is known now.
+        // The input of the second player arrives four steps late.
         let then = now.saturating_sub(LATE);
         if now >= LATE && push(1, then).is_some() {
             rollback.back(LATE + 1, &mut late)?;

@@ -12,7 +12,7 @@ const MAX_STEPS: u32 = 4;
 /// Steps between two states that are sent.
 const SEND_EVERY: u32 = 30;
 
-/// What a player asks for.
+/// The input of a player.
 #[derive(Clone, Copy)]
 pub enum Input {
     /// A force (N) until the next input.

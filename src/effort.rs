@@ -57,12 +57,12 @@ pub struct JointNeed {
 pub struct Effort {
     /// The class of each body.
     classes: Vec<u8>,
-    /// Steps in which the next lower class would have kept its promise, for each body.
-    calm_for: Vec<u8>,
+    /// Steps in a row in which the next lower class would have been enough, for each body.
+    descent_steps: Vec<u8>,
     /// Bodies that began on other bodies without a balance of forces, and whose islands have not come to rest since.
-    restless: Vec<u32>,
-    /// The need that gives these bodies [`RESTLESS_SUBSTEPS`].
-    restless_need: f32,
+    unbalanced: Vec<u32>,
+    /// The need that gives these bodies [`UNBALANCED_SUBSTEPS`].
+    unbalanced_need: f32,
     /// The classes of awake bodies in ascending order, one for each block.
     used: Vec<u8>,
     /// Whether any body, awake or not, is above class 0.
@@ -85,9 +85,9 @@ pub struct Effort {
 
 crate::saved::cloned!(Effort {
     classes,
-    calm_for,
-    restless,
-    restless_need,
+    descent_steps,
+    unbalanced,
+    unbalanced_need,
     used,
     any_above,
     is_refined,
@@ -105,9 +105,9 @@ impl Saved for Effort {
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         let Self {
             classes,
-            calm_for,
-            restless,
-            restless_need,
+            descent_steps,
+            unbalanced,
+            unbalanced_need,
             used,
             any_above,
             is_refined,
@@ -122,15 +122,15 @@ impl Saved for Effort {
         let bodies = archive.count(classes.len())?;
         if A::READS {
             classes.resize(bodies, 0);
-            calm_for.resize(bodies, 0);
+            descent_steps.resize(bodies, 0);
         }
         archive.runs(bodies, |i, archive| {
             classes[i].walk(archive)?;
-            calm_for[i].walk(archive)?;
+            descent_steps[i].walk(archive)?;
             ensure(classes[i] <= HIGHEST, || format!("body {i} has class {}", classes[i]))
         })?;
-        restless.walk(archive)?;
-        restless_need.walk(archive)?;
+        unbalanced.walk(archive)?;
+        unbalanced_need.walk(archive)?;
         used.walk(archive)?;
         any_above.walk(archive)?;
         is_refined.walk(archive)?;
@@ -143,7 +143,7 @@ impl Saved for Effort {
 
 /// Fewest substeps of an island with a body that began unbalanced, until the body rests or falls. Of 15 arches with 13
 /// to 41 wedges, 0.12 of the radius thick, 4 stand with 8 substeps, 9 with 16 and 10 with 32.
-const RESTLESS_SUBSTEPS: f32 = 32.0;
+const UNBALANCED_SUBSTEPS: f32 = 32.0;
 /// From this number of substeps on, a class falls after a number of substeps and not of steps, because each step costs
 /// more.
 const LONG_SUBSTEPS: u32 = 64;
@@ -193,24 +193,24 @@ impl Effort {
     ) -> bool {
         self.highest = Self::highest(config);
         self.long_from = (LONG_SUBSTEPS / config.substeps).checked_ilog2().unwrap_or(0) as u8;
-        self.restless_need = (RESTLESS_SUBSTEPS / config.substeps as f32).powi(2);
+        self.unbalanced_need = (UNBALANCED_SUBSTEPS / config.substeps as f32).powi(2);
         let is_first = self.classes.is_empty();
         if is_first {
             self.classes.resize(world.bodies.len(), 0);
-            self.calm_for.resize(world.bodies.len(), 0);
+            self.descent_steps.resize(world.bodies.len(), 0);
             self.movable = world.dynamic_count() as u32;
             if self.highest > 0 {
                 self.begin(world, config, dt);
             }
         }
-        let is_restless = !self.restless.is_empty();
-        let changed = (is_first || self.any_above || is_above || is_restless)
+        let any_unbalanced = !self.unbalanced.is_empty();
+        let changed = (is_first || self.any_above || is_above || any_unbalanced)
             && self.follow_islands(world, asleep, interfaces(), dt);
-        if is_restless {
+        if any_unbalanced {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
-            self.restless.retain(|&body| {
-                let restless = config.sleep_speed..FALL * world.gravity_on(body as usize).length();
-                restless.contains(&of_root[islands.root(body) as usize].fastest)
+            self.unbalanced.retain(|&body| {
+                let speeds = config.sleep_speed..FALL * world.gravity_on(body as usize).length();
+                speeds.contains(&of_root[islands.root(body) as usize].fastest)
             });
         }
         changed
@@ -222,18 +222,18 @@ impl Effort {
             return;
         }
         let bodies = world.bodies.len();
-        self.restless.retain(|&body| changed.binary_search(&(body as usize)).is_err());
+        self.unbalanced.retain(|&body| changed.binary_search(&(body as usize)).is_err());
         self.classes.resize(bodies, 0);
-        self.calm_for.resize(bodies, 0);
+        self.descent_steps.resize(bodies, 0);
         for &i in changed.iter().filter(|&&i| i < bodies) {
-            (self.classes[i], self.calm_for[i]) = (0, 0);
+            (self.classes[i], self.descent_steps[i]) = (0, 0);
         }
         self.movable = world.dynamic_count() as u32;
     }
 
     /// Adds bodies that begin on other bodies without a balance of forces.
-    pub fn note_restless(&mut self, bodies: Vec<u32>) {
-        self.restless.extend(bodies);
+    pub fn note_unbalanced(&mut self, bodies: Vec<u32>) {
+        self.unbalanced.extend(bodies);
     }
 
     /// Raises the class of the bodies of an island by two, which quarters the substep of the next step. Returns whether
@@ -244,7 +244,7 @@ impl Effort {
             return false;
         }
         for i in bodies {
-            (self.classes[i], self.calm_for[i]) = ((class + 2).min(self.highest), 0);
+            (self.classes[i], self.descent_steps[i]) = ((class + 2).min(self.highest), 0);
         }
         (self.any_above, self.is_refined) = (true, true);
         true
@@ -296,7 +296,7 @@ impl Effort {
             let i = i as usize;
             island.bodies += 1;
             island.class = island.class.max(self.classes[i]);
-            island.calm_for = island.calm_for.min(self.calm_for[i]);
+            island.descent_steps = island.descent_steps.min(self.descent_steps[i]);
             island.fastest = island.fastest.max(body.linear_velocity.length());
             if is_dynamic {
                 island.load += load_of(body, world.gravity_on(i), dt);
@@ -321,20 +321,20 @@ impl Effort {
                 island.contacts += 1;
             }
         }
-        for &body in &self.restless {
+        for &body in &self.unbalanced {
             let need = &mut self.of_root[root(body)].whole_need;
-            *need = need.max(self.restless_need);
+            *need = need.max(self.unbalanced_need);
         }
         for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
-            (island.class, island.calm_for) = island.next(self.highest, self.long_from);
+            (island.class, island.descent_steps) = island.next(self.highest, self.long_from);
         }
         let mut changed = std::mem::take(&mut self.is_refined);
         self.counts = [0; EFFORT_CLASSES];
         for &(body, is_dynamic) in &self.awake {
-            let Island { class, calm_for, .. } = self.of_root[root(body)];
+            let Island { class, descent_steps, .. } = self.of_root[root(body)];
             let body = body as usize;
             changed |= class != self.classes[body];
-            (self.classes[body], self.calm_for[body]) = (class, calm_for);
+            (self.classes[body], self.descent_steps[body]) = (class, descent_steps);
             self.counts[usize::from(class)] += u32::from(is_dynamic);
         }
         self.used.clear();

@@ -97,7 +97,7 @@ struct Entry {
     reserve: f64,
     slack: f64,
     /// Energy that the springs of joints, and of contacts of jointed bodies, held before; and the energy that they hold
-    /// now, including the energy of lent inertia.
+    /// now, including the energy of stiffness inertia.
     kept: f64,
     springs: f64,
     /// Kinetic energy below which motion counts as rest.
@@ -261,7 +261,7 @@ impl Energy {
             ..entry(body, i, problem, dt.into(), substep(i))
         };
         world.bodies.par_iter().with_min_len(256).enumerate().map(entry).collect_into_vec(&mut self.entries);
-        self.add_lent_inertia(world, problem);
+        self.add_energy_of_stiffness_inertia(world, problem);
         springs::add_springs(&mut self.entries, problem, world, substep);
         self.add_contacts_of_jointed(problem, effort);
         self.fresh.sort_unstable();
@@ -297,17 +297,17 @@ impl Energy {
         taken
     }
 
-    /// Adds the energy of the inertia that joints lent to bodies in this step to the energy of their springs. It counts
-    /// only as far as the motion lost it, because the lent inertia is gone in the next step.
-    fn add_lent_inertia(&mut self, world: &World, problem: &StepProblem) {
+    /// Adds the energy of the stiffness inertia of this step to the energy of the springs of its bodies. It counts
+    /// only as far as the motion lost it, because this inertia is gone in the next step.
+    fn add_energy_of_stiffness_inertia(&mut self, world: &World, problem: &StepProblem) {
         for row in &problem.turning {
             let i = row.body as usize;
             let (body, entry) = (&world.bodies[i], &mut self.entries[i]);
             let inertia = InverseMass::of(&problem.masses[i]).inertia.as_dmat3().inverse();
-            let lent = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
+            let added = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
             // The inertia rotates with the body.
             let spin = (turn_of(&problem.bodies[i]).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
-            entry.springs += (0.5 * spin.dot(lent * spin)).max(0.0);
+            entry.springs += (0.5 * spin.dot(added * spin)).max(0.0);
         }
     }
 

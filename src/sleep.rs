@@ -123,14 +123,14 @@ const EVERY: u32 = 8;
 
 /// How [`Sleep::walk`] writes the state in which a body was left.
 #[derive(Clone, Copy, PartialEq)]
-enum Left {
+enum SavedPose {
     /// Awake bodies that can be pushed have no such state.
     Unused,
     AsTheBody,
     Other,
 }
 
-crate::saved::kinds!(Left { Unused, AsTheBody, Other });
+crate::saved::kinds!(SavedPose { Unused, AsTheBody, Other });
 
 impl Sleep {
     /// Writes the lasting state, or reads it, for the bodies of `world`. `kinds` are their kinds in the step before.
@@ -150,10 +150,10 @@ impl Sleep {
             next.resize(bodies, 0);
         }
         let now = |i: usize| world.bodies.get(i).map(|_| Snapshot::of(world, i)).unwrap_or_default();
-        let mut are_left = vec![Left::Unused; bodies];
+        let mut are_left = vec![SavedPose::Unused; bodies];
         archive.runs(bodies, |i, archive| {
             if !A::READS && (kinds[i] != BodyKind::Dynamic || asleep[i]) {
-                are_left[i] = if left[i].bits() == now(i).bits() { Left::AsTheBody } else { Left::Other };
+                are_left[i] = if left[i].bits() == now(i).bits() { SavedPose::AsTheBody } else { SavedPose::Other };
             }
             asleep[i].walk(archive)?;
             activity[i].walk(archive)?;
@@ -163,7 +163,7 @@ impl Sleep {
         })?;
         for ((i, left), is_left) in left.iter_mut().enumerate().zip(are_left) {
             match is_left {
-                Left::Other => left.walk(archive)?,
+                SavedPose::Other => left.walk(archive)?,
                 _ if A::READS => *left = now(i),
                 _ => {}
             }
@@ -354,20 +354,20 @@ impl Sleep {
                 self.islands.join(a as u32, b as u32);
             }
         }
-        let mut restless = vec![false; self.asleep.len()];
+        let mut stays_awake = vec![false; self.asleep.len()];
         for pair in detector.pairs().filter(|pair| pair.takes_part && comes_out(pair, world, config)) {
             for body in [pair.body_a, pair.body_b].into_iter().filter(|&body| is_dynamic(body as usize)) {
-                restless[self.islands.root(body) as usize] = true;
+                stays_awake[self.islands.root(body) as usize] = true;
             }
         }
         let awake: Vec<usize> = (0..self.asleep.len()).filter(|&i| is_dynamic(i) && !self.asleep[i]).collect();
         for &i in &awake {
-            restless[self.islands.root(i as u32) as usize] |=
+            stays_awake[self.islands.root(i as u32) as usize] |=
                 self.slow_for[i] < self.after || !held[i] || driven[i] || !world.bodies[i].can_sleep;
         }
         for i in awake {
             let root = self.islands.root(i as u32) as usize;
-            if restless[root] {
+            if stays_awake[root] {
                 continue;
             }
             let body = &mut world.bodies[i];

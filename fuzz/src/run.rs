@@ -18,16 +18,16 @@ fn one_thread() -> &'static ThreadPool {
 }
 
 /// A backend with its number of threads.
-struct Way {
+struct Variant {
     name: &'static str,
     pool: fn() -> &'static ThreadPool,
     backend: fn() -> Box<dyn Backend>,
 }
 
-const WAYS: [Way; 3] = [
-    Way { name: "reference", pool: one_thread, backend: || Box::new(Reference::<f32>::new()) },
-    Way { name: "lanes", pool: one_thread, backend: || Box::new(Cpu::new()) },
-    Way { name: "three threads", pool: three_threads, backend: || Box::new(Cpu::new()) },
+const VARIANTS: [Variant; 3] = [
+    Variant { name: "reference", pool: one_thread, backend: || Box::new(Reference::<f32>::new()) },
+    Variant { name: "lanes", pool: one_thread, backend: || Box::new(Cpu::new()) },
+    Variant { name: "three threads", pool: three_threads, backend: || Box::new(Cpu::new()) },
 ];
 
 /// A simulation in three variants.
@@ -38,9 +38,10 @@ pub struct Runs {
 impl Runs {
     /// Returns `None` if the world or the settings are refused. All variants must refuse them with the same line.
     pub fn new(world: &World, config: &SolverConfig) -> Option<Self> {
-        let begun =
-            |way: &Way| (way.pool)().install(|| Simulation::with(world.clone(), config.clone(), (way.backend)()));
-        let simulations: Vec<_> = agreed(WAYS.iter().map(begun).collect())?;
+        let begun = |variant: &Variant| {
+            (variant.pool)().install(|| Simulation::with(world.clone(), config.clone(), (variant.backend)()))
+        };
+        let simulations: Vec<_> = agreed(VARIANTS.iter().map(begun).collect())?;
         Some(Self { simulations })
     }
 
@@ -61,30 +62,35 @@ impl Runs {
 
     /// Saves and loads each variant except the first.
     pub fn reload(&mut self) {
-        for (simulation, way) in self.simulations.iter_mut().zip(&WAYS).skip(1) {
+        for (simulation, variant) in self.simulations.iter_mut().zip(&VARIANTS).skip(1) {
             let saved = simulation.save();
-            *simulation = Simulation::load(&saved, (way.backend)()).expect("what was saved");
+            *simulation = Simulation::load(&saved, (variant.backend)()).expect("what was saved");
         }
     }
 
     /// Makes a step of each variant. Either all refuse it or none. Every NaN must be reported, and all variants must
     /// have the same bits.
     pub fn step(&mut self, dt: f32) -> bool {
-        let step = |(simulation, way): (&mut Simulation, &Way)| (way.pool)().install(|| simulation.step(dt));
+        let step =
+            |(simulation, variant): (&mut Simulation, &Variant)| (variant.pool)().install(|| simulation.step(dt));
         let before = self.simulations[0].hash();
-        let stats = self.simulations.iter_mut().zip(&WAYS).map(step).collect();
+        let stats = self.simulations.iter_mut().zip(&VARIANTS).map(step).collect();
         let Some(stats) = agreed(stats) else {
             assert_eq!(self.simulations[0].hash(), before, "a refused step moved something");
             return false;
         };
         let first = &self.simulations[0];
-        for ((simulation, way), stats) in self.simulations.iter().zip(&WAYS).zip(&stats) {
+        for ((simulation, variant), stats) in self.simulations.iter().zip(&VARIANTS).zip(&stats) {
             let unreported = simulation.world.first_non_finite();
-            assert_eq!(stats.first_non_finite, unreported, "{}: the first body with a NaN", way.name);
+            assert_eq!(stats.first_non_finite, unreported, "{}: the first body with a NaN", variant.name);
             let differs =
                 first.world.bodies.iter().zip(&*simulation.world.bodies).position(|(a, b)| bits(a) != bits(b));
-            assert_eq!(differs, None, "{}: the first body whose bits are others", way.name);
-            assert!(first.events().iter().map(debug).eq(simulation.events().iter().map(debug)), "{}: events", way.name);
+            assert_eq!(differs, None, "{}: the first body whose bits are others", variant.name);
+            assert!(
+                first.events().iter().map(debug).eq(simulation.events().iter().map(debug)),
+                "{}: events",
+                variant.name
+            );
         }
         true
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use drystone::stages::random::SplitMix64;
 use drystone_fuzz::{TARGETS, Target, target};
 
-/// What the check of an input says where a promise is broken.
+/// The message of the check of an input, if the input breaks a promise.
 fn broken(target: &Target, data: &[u8]) -> Option<String> {
     let check = target.check;
     let said = catch_unwind(|| check(data)).err()?;

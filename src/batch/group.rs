@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use super::member::{Member, Way};
+use super::member::{Member, RunLength};
 use crate::backend::cpu::Cpu;
 use crate::backend::{Backend, CheckedStep};
 use crate::config::SolverConfig;
@@ -48,7 +48,7 @@ enum Stage {
 /// Runs the steps of a run; see [`Batch::run`](super::Batch::run).
 pub(super) fn run<T>(
     jobs: &mut [(&mut T, &mut Member)],
-    way: Way,
+    way: RunLength,
     before: &impl Fn(&T, u64, &mut World) -> Result<()>,
     after: &impl Fn(&mut T, u64, &Member),
     group: &mut Group,

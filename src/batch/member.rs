@@ -50,7 +50,7 @@ pub struct Member {
 
 /// The length of a run.
 #[derive(Clone, Copy)]
-pub(super) struct Way<'a> {
+pub(super) struct RunLength<'a> {
     pub steps: u64,
     pub dt: Option<f32>,
     pub is_over: &'a AtomicBool,

@@ -52,7 +52,7 @@ pub use column::{Column, DriveOf, drives, write};
 pub use contacts::{Contacts, EventRow};
 use group::Group;
 pub use member::Member;
-use member::Way;
+use member::RunLength;
 pub use state::State;
 
 /// Interval between calls of [`Run::stop`].
@@ -236,7 +236,7 @@ impl Batch {
         after: impl Fn(&mut T, u64, &Member) + Sync,
     ) -> Result<Vec<usize>> {
         let is_over = AtomicBool::new(false);
-        let way = Way { steps: run.steps, dt: run.dt, is_over: &is_over };
+        let way = RunLength { steps: run.steps, dt: run.dt, is_over: &is_over };
         let meanwhile = || is_over.store(run.stop.is_some_and(|stop| stop()), Ordering::Relaxed);
         let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
         self.check(chosen.iter().copied())?;

@@ -12,7 +12,7 @@ use super::pairs::Placed;
 use super::places::Places;
 use super::report::{Change, DetectStats};
 use super::sensors::{Overlap, Visitors};
-use super::teleport::{Left, Teleports};
+use super::teleport::{LastPose, Teleports};
 use super::world_contacts::{ColliderRange, DetectionInput, PlacedBody, WorldContacts, key};
 use crate::config::SolverConfig;
 use crate::error::{Result, ensure};
@@ -38,7 +38,7 @@ pub struct Detector {
     pub(super) extents: Vec<Extent>,
     /// The pose of each body after the last step. The `sleep` module, which builds on the detector, keeps the state
     /// that decides whether a body can sleep.
-    left: Vec<Left>,
+    left: Vec<LastPose>,
     /// Displacement by gravity in one step, in each world (m).
     falls: Vec<f32>,
     /// Pairs of bodies that a joint keeps from colliding, the smaller index first.
@@ -88,7 +88,7 @@ impl Detector {
             self.known.resize(bodies, KnownBody::default());
             self.kinds.resize(bodies, BodyKind::Fixed);
             self.groups.resize(bodies, Groups::ALL);
-            self.left.resize(bodies, Left::default());
+            self.left.resize(bodies, LastPose::default());
         }
         // Whether each body has the colliders that it has in the world, and whether it has the pose that the last step
         // left.
@@ -120,7 +120,7 @@ impl Detector {
         })?;
         for (i, left) in self.left.iter_mut().enumerate() {
             match world.bodies.get(i).filter(|_| are_left[i]) {
-                Some(body) => *left = Left::of(body),
+                Some(body) => *left = LastPose::of(body),
                 None => left.walk(archive)?,
             }
         }
@@ -216,8 +216,11 @@ impl Detector {
         self.known.truncate(world.bodies.len());
         self.kinds.truncate(world.bodies.len());
         self.groups.truncate(world.bodies.len());
-        self.left.resize(world.bodies.len(), Left::default());
-        changed.iter().filter(|&&i| i < world.bodies.len()).for_each(|&i| self.left[i] = Left::of(&world.bodies[i]));
+        self.left.resize(world.bodies.len(), LastPose::default());
+        changed
+            .iter()
+            .filter(|&&i| i < world.bodies.len())
+            .for_each(|&i| self.left[i] = LastPose::of(&world.bodies[i]));
     }
 
     /// Ends the contacts of bodies that the caller moved since [`Self::note_left`].
@@ -229,7 +232,7 @@ impl Detector {
 
     /// Records the poses of the bodies after a step.
     pub fn note_left(&mut self, world: &World) {
-        world.bodies.par_iter().with_min_len(1024).map(Left::of).collect_into_vec(&mut self.left);
+        world.bodies.par_iter().with_min_len(1024).map(LastPose::of).collect_into_vec(&mut self.left);
     }
 
     /// Updates the pairs of bodies that joints keep from colliding.

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::collider::{Activity, BodyState, ColliderInfo, FARTHEST, is_in_range, is_placed};
 use super::detector::Detector;
 use super::sensors::{Overlap, Visitors};
-use super::sweep::{Impact, Station, Swept, Until, Way, impact};
+use super::sweep::{BodyPath, Impact, Station, Swept, Until, impact};
 use super::world_contacts::{WorldContacts, box_reaches_plane, key};
 use crate::graph::Islands;
 use crate::math::rotation::product;
@@ -66,10 +66,10 @@ struct End {
 }
 
 /// The path that a body took.
-fn way(then: &BodyState, now: &Body, dt: f32) -> Way {
+fn way(then: &BodyState, now: &Body, dt: f32) -> BodyPath {
     let begin = Station { center: then.center, rotation: then.rotation };
     let end = Station { center: now.center_of_mass(), rotation: now.rotation };
-    Way::between(begin, end, now.angular_velocity * dt)
+    BodyPath::between(begin, end, now.angular_velocity * dt)
 }
 
 impl Detector {
@@ -157,7 +157,7 @@ impl Detector {
             let Station { center, rotation } = way.at(time);
             let other = self.way_of(world, other, dt);
             let center = center + (1.0 - time) * other.shift;
-            way = Way::between(way.begin, Station { center, rotation }, time * way.turn);
+            way = BodyPath::between(way.begin, Station { center, rotation }, time * way.turn);
             let against = if is_deep { normal } else { Vec3::ZERO };
             end = Some(End { at: Station { center, rotation }, share: time, against, pace: other.shift / dt });
         }
@@ -172,13 +172,13 @@ impl Detector {
         }
     }
 
-    fn way_of(&self, world: &World, i: u32, dt: f32) -> Way {
+    fn way_of(&self, world: &World, i: u32, dt: f32) -> BodyPath {
         way(&self.moving[i as usize], &world.bodies[i as usize], dt)
     }
 
     /// The first obstacle of a body on its path, and the time: a moving one, or a fixed one. Of bodies that contacts
     /// can push, only a bullet meets moving obstacles.
-    fn first_on(&self, world: &World, i: u32, way: &Way, dt: f32, moves: bool) -> Option<(Impact, u32)> {
+    fn first_on(&self, world: &World, i: u32, way: &BodyPath, dt: f32, moves: bool) -> Option<(Impact, u32)> {
         let (known, then) = (self.known[i as usize], &self.moving[i as usize]);
         let part = &self.worlds[known.world as usize];
         let first: Cell<Option<(Impact, u32)>> = Cell::new(None);

@@ -12,7 +12,7 @@ use super::manifold::{MAX_POINTS, Manifold};
 use super::narrow::Narrow;
 use super::pair::{Pair, PairScratch, Update};
 use super::pairs::Track;
-use super::sweep::{Station, Swept, Until, Way, impact, overlap_at_end};
+use super::sweep::{BodyPath, Station, Swept, Until, impact, overlap_at_end};
 use crate::lanes::InstructionSet;
 
 /// Approach in a step from which the contact is that of the time of impact, relative to the smallest half extent of the
@@ -92,7 +92,7 @@ impl Narrow<'_> {
             return None;
         }
         // The next substep can start from the velocities that the last substep leaves.
-        let ways = bodies.map(|body| Way::free(body, step));
+        let ways = bodies.map(|body| BodyPath::free(body, step));
         let [a, b] = [(0, pair.collider_a), (1, pair.collider_b)]
             .map(|(side, c)| Swept::new(&self.colliders[c as usize], bodies[side], &ways[side]));
         let free = |manifold: &Manifold| self.free_separations(manifold, bodies, TOUCHING * size);
@@ -148,7 +148,7 @@ impl Narrow<'_> {
 
     /// Whether a body of a pair meets fixed geometry before a time. Then it does not reach the place where it would
     /// meet the other body.
-    fn is_held_up(&self, pair: &Pair, ways: &[Way; 2], time: f32) -> bool {
+    fn is_held_up(&self, pair: &Pair, ways: &[BodyPath; 2], time: f32) -> bool {
         let is_earlier = |side: usize| {
             let c = &self.colliders[[pair.collider_a, pair.collider_b][side] as usize];
             let body = &self.moving[c.body as usize];
@@ -163,7 +163,7 @@ impl Narrow<'_> {
                 if is_earlier || others || !self.neighbors.may_hold(c.body, standing.body) {
                     return;
                 }
-                let way = Way::free(&self.moving[standing.body as usize], 0.0);
+                let way = BodyPath::free(&self.moving[standing.body as usize], 0.0);
                 let standing = Swept::new(standing, &self.moving[standing.body as usize], &way);
                 let met = impact(standing, own, c.size, Until::Deep, true);
                 is_earlier = met.is_some_and(|met| met.time < time);
@@ -172,7 +172,7 @@ impl Narrow<'_> {
             is_earlier
                 || self.neighbors.planes.iter().any(|plane| {
                     let standing = &self.colliders[plane.collider as usize];
-                    let way = Way::free(&self.moving[standing.body as usize], 0.0);
+                    let way = BodyPath::free(&self.moving[standing.body as usize], 0.0);
                     let others = [pair.collider_a, pair.collider_b].contains(&plane.collider);
                     let standing = Swept::new(standing, &self.moving[standing.body as usize], &way);
                     let met = || impact(standing, own, c.size, Until::Deep, true);
@@ -207,7 +207,7 @@ impl Narrow<'_> {
         for k in 0..=count {
             let (then, next) = (k as f32 * substep, (k + 1) as f32 * substep);
             let drift = then * (v + 0.5 * next * pull);
-            let turns = [a, b].map(|body| Way::free(body, then).turned(1.0));
+            let turns = [a, b].map(|body| BodyPath::free(body, then).turned(1.0));
             let movement = manifold.movement(drift, turns);
             let swerve = |body: &BodyState, arm: Vec3| SWERVE * body.w.length_squared() * arm.cross(normal).length();
             for (least, point) in least.iter_mut().zip(manifold.points()) {

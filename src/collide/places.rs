@@ -28,7 +28,7 @@ impl Place {
 }
 
 /// Colliders with their boxes in the tree of a detection.
-pub(super) struct Standing<'a> {
+pub(super) struct TreeColliders<'a> {
     pub tree: &'a Tree,
     pub places: Vec<Place>,
     pub boxes: &'a [Aabb],
@@ -48,7 +48,7 @@ impl Places {
     pub(super) fn of<'a>(
         world: &World,
         count: impl Fn(usize) -> usize,
-        standing: impl Fn(usize) -> Option<Standing<'a>> + Sync,
+        standing: impl Fn(usize) -> Option<TreeColliders<'a>> + Sync,
     ) -> Vec<Self> {
         let mut new = vec![Vec::new(); world.world_count()];
         for (i, (body, &part)) in world.bodies.iter().zip(world.bodies.worlds()).enumerate() {
@@ -64,10 +64,10 @@ impl Places {
         Self::of(world, |_| 0, |_| None)
     }
 
-    fn with(world: &World, part: usize, standing: Option<Standing>, new: &[Place]) -> Self {
+    fn with(world: &World, part: usize, standing: Option<TreeColliders>, new: &[Place]) -> Self {
         let none = Tree::default();
-        let Standing { tree, mut places, boxes } =
-            standing.unwrap_or(Standing { tree: &none, places: Vec::new(), boxes: &[] });
+        let TreeColliders { tree, mut places, boxes } =
+            standing.unwrap_or(TreeColliders { tree: &none, places: Vec::new(), boxes: &[] });
         places.extend(new);
         let now = |(k, place): (usize, &Place)| {
             let is_here = world.bodies.worlds().get(place.body as usize) == Some(&(part as u32));

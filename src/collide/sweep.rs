@@ -27,7 +27,7 @@ pub(super) struct Station {
 
 /// The path of a body through a step, whose length is 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(super) struct BodyPath {
     pub begin: Station,
     /// Displacement of the center of mass (m).
     pub shift: Vec3,
@@ -35,7 +35,7 @@ pub(super) struct Way {
     pub turn: Vec3,
 }
 
-impl Way {
+impl BodyPath {
     /// The path of a free body in a step of `dt` seconds.
     pub fn free(body: &BodyState, dt: f32) -> Self {
         let begin = Station { center: body.center, rotation: body.rotation };
@@ -67,7 +67,7 @@ impl Way {
 /// A convex shape on its path.
 #[derive(Clone, Copy)]
 struct Mover<'a> {
-    way: &'a Way,
+    way: &'a BodyPath,
     shape: &'a dyn Shape,
     /// The shape without its rounding; `None` for a point.
     core: Option<&'a dyn PolygonalFeatureMap>,
@@ -84,12 +84,12 @@ pub(super) struct Swept<'a> {
     pub shape: &'a dyn Shape,
     /// Pose of the shape relative to the center of mass of its body.
     local: Pose,
-    way: &'a Way,
+    way: &'a BodyPath,
 }
 
 impl<'a> Swept<'a> {
     /// A collider of `body`. The center of mass keeps its place in the frame of the body.
-    pub fn new(collider: &'a ColliderInfo, body: &BodyState, way: &'a Way) -> Self {
+    pub fn new(collider: &'a ColliderInfo, body: &BodyState, way: &'a BodyPath) -> Self {
         let center = body.rotation.inverse() * (body.center - body.position);
         let local = Pose::from_parts(collider.local.translation - center, collider.local.rotation);
         Self { shape: &*collider.shape, local, way }
@@ -314,7 +314,7 @@ fn with_plane(plane: &Swept, normal: Vec3, b: &Mover, size: f32, until: Until) -
 }
 
 /// Rounding error of a separation, from the sizes of its terms.
-fn rounding(way: &Way, apart: Vec3) -> f32 {
+fn rounding(way: &BodyPath, apart: Vec3) -> f32 {
     2.0 * f32::EPSILON * (way.shift.length() + apart.length())
 }
 

@@ -14,14 +14,14 @@ use crate::world::{Bodies, Body, BodyKind};
 
 /// The pose of a body after the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Left {
+pub(super) struct LastPose {
     rotation: Quat,
     position: Vec3,
 }
 
-crate::saved::fields!(Left { rotation, position });
+crate::saved::fields!(LastPose { rotation, position });
 
-impl Left {
+impl LastPose {
     pub fn of(body: &Body) -> Self {
         Self { rotation: body.rotation, position: body.position }
     }
@@ -36,16 +36,16 @@ impl Left {
 
 /// The poses of all bodies after the last step and now. It exists only if the caller moved one of them.
 pub(super) struct Teleports<'a> {
-    left: &'a [Left],
-    now: Vec<Left>,
+    left: &'a [LastPose],
+    now: Vec<LastPose>,
 }
 
 impl<'a> Teleports<'a> {
     /// Returns `None` if every body has the pose that the step left.
-    pub fn find(left: &'a [Left], bodies: &Bodies) -> Option<Self> {
-        let is_elsewhere = |(body, left): (&Body, &Left)| Left::of(body) != *left;
+    pub fn find(left: &'a [LastPose], bodies: &Bodies) -> Option<Self> {
+        let is_elsewhere = |(body, left): (&Body, &LastPose)| LastPose::of(body) != *left;
         let any = bodies.par_iter().with_min_len(1024).zip(left).any(is_elsewhere);
-        any.then(|| Self { left, now: bodies.iter().map(Left::of).collect() })
+        any.then(|| Self { left, now: bodies.iter().map(LastPose::of).collect() })
     }
 
     /// Ends the contacts of two bodies if the caller moved one of them relative to the other by more than half of the
@@ -83,7 +83,7 @@ impl<'a> Teleports<'a> {
             return false;
         }
         let turned = |i: usize| product(self.now[i].rotation, self.left[i].rotation.inverse());
-        let apart = |from: &[Left]| from[b].position - from[a].position;
+        let apart = |from: &[LastPose]| from[b].position - from[a].position;
         let (turn_a, turn_b) = (turned(a), turned(b));
         let shift = apart(&self.now) - turn_a * apart(self.left);
         let turn = product(turn_a.inverse(), turn_b);

@@ -18,7 +18,7 @@ use super::narrow::{Narrow, Updated};
 use super::pair::Pair;
 use super::pairs::Pairs;
 use super::path::ANEW;
-use super::places::{Place, Standing};
+use super::places::{Place, TreeColliders};
 use super::report::{Change, DetectStats};
 use super::tree::{NOWHERE, Tree};
 use crate::world::{BodyKind, Collider, Groups, placed};
@@ -170,13 +170,13 @@ impl WorldContacts {
     }
 
     /// The colliders with their places in the tree at the last detection. `range_of` returns those of a body.
-    pub fn standing(&self, range_of: impl Fn(usize) -> ColliderRange) -> Standing<'_> {
+    pub fn standing(&self, range_of: impl Fn(usize) -> ColliderRange) -> TreeColliders<'_> {
         let place = |(c, i): (&ColliderInfo, u32)| {
             let first = if c.is_gone() { i } else { range_of(c.body as usize).first };
             Place { body: c.body, collider: i - first }
         };
         let places = self.colliders.iter().zip(0..).map(place).collect();
-        Standing { tree: &self.tree, places, boxes: &self.fat }
+        TreeColliders { tree: &self.tree, places, boxes: &self.fat }
     }
 
     /// Makes the next detection search for all pairs, because joints changed.

@@ -9,15 +9,15 @@ pub struct Island {
     pub largest_need: f32,
     /// The largest load that its bodies and the drives of its joints can cause (N).
     pub load: f32,
-    /// The largest need of its joints and of restless bodies. It is not shared among contacts.
+    /// The largest need of its joints and of unbalanced bodies. It is not shared among contacts.
     pub whole_need: f32,
     pub contacts: u32,
     pub bodies: u32,
     /// The speed of its fastest body (m/s).
     pub fastest: f32,
-    /// The highest class of its bodies, and the fewest calm steps of any.
+    /// The highest class of its bodies, and the fewest steps of any towards a lower class.
     pub class: u8,
-    pub calm_for: u8,
+    pub descent_steps: u8,
 }
 
 impl Island {
@@ -30,7 +30,7 @@ impl Island {
         bodies: 0,
         fastest: 0.0,
         class: 0,
-        calm_for: u8::MAX,
+        descent_steps: u8::MAX,
     };
 
     /// The need of the contacts that counts. A column passes its load on through one contact for each body, and sways
@@ -41,8 +41,8 @@ impl Island {
         self.largest_need * ways * ways
     }
 
-    /// The next class, and the number of calm steps so far. `highest` is the highest class that the settings allow.
-    /// Above the class `long_from`, fewer steps suffice.
+    /// The next class, and the number of steps so far towards a lower one. `highest` is the highest class that the
+    /// settings allow. Above the class `long_from`, fewer steps suffice.
     pub fn next(&self, highest: u8, long_from: u8) -> (u8, u8) {
         let class = self.class.min(highest);
         let need = self.counted().max(self.whole_need);
@@ -51,19 +51,20 @@ impl Island {
             return (wanted, 0);
         }
         // From `long_from` on, every class waits for the same number of substeps.
-        let calm = u32::from(self.calm_for) + (1 << class.saturating_sub(long_from));
-        match need > CALM_SHARE * sag_factor(class - 1) {
+        let steps = u32::from(self.descent_steps) + (1 << class.saturating_sub(long_from));
+        match need > DESCENT_SHARE * sag_factor(class - 1) {
             true => (class, 0),
-            false if calm >= CALM_STEPS => (class - 1, 0),
-            false => (class, calm as u8),
+            false if steps >= DESCENT_STEPS => (class - 1, 0),
+            false => (class, steps as u8),
         }
     }
 }
 
-/// Calm steps after which an island goes down one class, up to `long_from`. Each class above halves the number.
-const CALM_STEPS: u32 = 60;
+/// Steps in which the next lower class is enough, after which an island goes down one class, up to `long_from`. Each
+/// class above halves the number.
+const DESCENT_STEPS: u32 = 60;
 /// The share of the promise that the next lower class has to keep.
-const CALM_SHARE: f32 = 0.5;
+const DESCENT_SHARE: f32 = 0.5;
 /// The highest class of all.
 pub const HIGHEST: u8 = EFFORT_CLASSES as u8 - 1;
 
@@ -88,11 +89,11 @@ mod tests {
         }
     }
 
-    fn island(need: f32, class: u8, calm_for: u8) -> Island {
-        Island { largest_need: need, contacts: 2, bodies: 2, class, calm_for, ..Island::NONE }
+    fn island(need: f32, class: u8, descent_steps: u8) -> Island {
+        Island { largest_need: need, contacts: 2, bodies: 2, class, descent_steps, ..Island::NONE }
     }
 
-    /// The next class and the steps of calm.
+    /// The next class and the steps towards a lower one.
     fn next(island: Island, highest: u8) -> (u8, u8) {
         island.next(highest, 3)
     }
@@ -108,7 +109,7 @@ mod tests {
         assert_eq!(next(island(1.9, 2, 59), 3), (1, 0));
         assert_eq!(next(island(0.0, 0, 9), 3), (0, 0));
         assert_eq!(next(island(0.0, 7, 0), 7), (7, 16));
-        assert_eq!([43, 44].map(|calm_for| next(island(0.0, 7, calm_for), 7)), [(7, 59), (6, 0)]);
+        assert_eq!([43, 44].map(|descent_steps| next(island(0.0, 7, descent_steps), 7)), [(7, 59), (6, 0)]);
     }
 
     #[test]

@@ -83,8 +83,8 @@ pub(crate) struct PlanKey {
     totals: bool,
     /// Whether impulses of joints are summed.
     joint_totals: bool,
-    /// Whether the bodies of each block have equal moments of inertia. This can change, because joints lend some
-    /// inertia in each step.
+    /// Whether the bodies of each block have equal moments of inertia. This can change, because joints add
+    /// stiffness inertia in each step.
     isotropic: Vec<bool>,
     has_torques: bool,
     has_dampings: bool,

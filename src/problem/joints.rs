@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, HashMap};
 use glam::Vec3;
 
 use super::axes;
+use super::geometric_stiffness::{StiffnessInertia, add_stiffness_inertia};
 use super::joint_sets::{gap_of_sweeps, promised_gap};
-use super::lent_inertia::{LentInertia, lend_inertia};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
@@ -42,8 +42,8 @@ pub struct JointRows {
     left: Vec<LeftToSweeps>,
     /// The factor from ω² of turning arms to the gap that they open, relative to the promised gap (s²).
     gap_of_turns: f32,
-    /// Inertia that joints lend to bodies, in memory that steps reuse.
-    lent: Vec<LentInertia>,
+    /// Stiffness inertia of bodies, in memory that steps reuse.
+    stiffness_inertias: Vec<StiffnessInertia>,
 }
 
 crate::saved::state!(JointRows {
@@ -58,7 +58,7 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     left,
-} scratch { graph, sums, gap_of_turns, lent });
+} scratch { graph, sums, gap_of_turns, stiffness_inertias });
 
 /// The factor by which a joint of a swinging net may open further in the next step.
 const GROWTH: f32 = 2.5;
@@ -411,7 +411,11 @@ impl JointRows {
         }
         let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
         let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
-        lend_inertia(direct.map(|joint| (joint, substep * self.shares[joint])), &mut self.lent, problem);
+        add_stiffness_inertia(
+            direct.map(|joint| (joint, substep * self.shares[joint])),
+            &mut self.stiffness_inertias,
+            problem,
+        );
         // Locked axes are axes of the world, so the inverse inertia of a body with locked axes does not turn with it.
         problem.turning.retain(|row| !world.bodies[row.body as usize].has_locked_rotation());
         // The world, as a body that nothing moves.

@@ -75,14 +75,14 @@ pub(super) struct Prepare<'a> {
 }
 
 /// One kind of preparation over some slots, in ascending order.
-pub(super) struct Over<'a> {
+pub(super) struct PrepareSlots<'a> {
     pub rows: &'a Prepare<'a>,
     pub slots: &'a [u32],
-    pub what: What,
+    pub preparation: Preparation,
 }
 
 #[derive(Clone, Copy)]
-pub(super) enum What {
+pub(super) enum Preparation {
     /// The effective masses of points.
     Masses { tangents: bool, jams: bool },
     /// The present separations of points, and then preloads and sags from the impulses of the step before.
@@ -103,7 +103,7 @@ const fn units<T>() -> u32 {
     (size_of::<T>() / 8) as u32
 }
 
-impl Over<'_> {
+impl PrepareSlots<'_> {
     #[inline(always)]
     fn group(&self, group: usize) -> Group {
         let own = &self.slots[WIDTH * group..(WIDTH * (group + 1)).min(self.slots.len())];
@@ -262,14 +262,14 @@ impl Over<'_> {
     }
 }
 
-impl Work for Over<'_> {
+impl Work for PrepareSlots<'_> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         for group in groups {
             let group = self.group(group);
-            match self.what {
-                What::Masses { tangents, jams } => self.write_masses::<L>(&group, tangents, jams),
-                What::Begin { separations, loads } => self.begin::<L>(&group, separations, loads),
+            match self.preparation {
+                Preparation::Masses { tangents, jams } => self.write_masses::<L>(&group, tangents, jams),
+                Preparation::Begin { separations, loads } => self.begin::<L>(&group, separations, loads),
             }
         }
     }
@@ -364,7 +364,9 @@ mod tests {
     }
 
     fn in_lanes(tables: &mut Tables, slots: &[u32], set: InstructionSet) {
-        for what in [What::Masses { tangents: true, jams: true }, What::Begin { separations: true, loads: true }] {
+        for preparation in
+            [Preparation::Masses { tangents: true, jams: true }, Preparation::Begin { separations: true, loads: true }]
+        {
             let rows = Prepare {
                 stride: STRIDE,
                 masses: &tables.masses,
@@ -377,7 +379,7 @@ mod tests {
                 sags: Shared::new(&mut tables.sags),
                 jams: Shared::new(&mut tables.jams),
             };
-            set.run(&Over { rows: &rows, slots, what }, 0..slots.len().div_ceil(WIDTH));
+            set.run(&PrepareSlots { rows: &rows, slots, preparation }, 0..slots.len().div_ceil(WIDTH));
         }
     }
 

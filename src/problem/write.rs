@@ -12,7 +12,7 @@ use super::arithmetic::{inverse_or_zero, square_root};
 use super::carry::Carry;
 use super::effective::{EffectiveMass, InverseMass};
 use super::points_a_slot;
-use super::prepare::{ComputedRow, Over, PoseRow, Prepare, What};
+use super::prepare::{ComputedRow, PoseRow, Preparation, Prepare, PrepareSlots};
 use super::rescale::change_share;
 use super::rows::{BodyRow, ContactRow, ImpulseRow, MassRow, PointRow};
 use super::slots::{Slot, Write};
@@ -61,12 +61,12 @@ pub(super) struct SlotRows<'a> {
 pub(super) const SLOTS_A_TASK: usize = 256;
 
 /// Some of the slots of a task, in ascending order.
-pub(super) struct Chosen {
+pub(super) struct SelectedSlots {
     slots: [u32; SLOTS_A_TASK],
     count: usize,
 }
 
-impl Chosen {
+impl SelectedSlots {
     pub fn of(slots: &[Slot], mut is_wanted: impl FnMut(&Slot) -> bool) -> Self {
         let mut chosen = Self { slots: [0; SLOTS_A_TASK], count: 0 };
         for (i, slot) in (0..).zip(slots) {
@@ -100,8 +100,8 @@ impl Writer<'_> {
     /// Writes the rows of consecutive slots, the first of which has the number `first`.
     fn write_some(&self, first: usize, slots: &[Slot], mut rows: SlotRows) {
         let stride = points_a_slot(self.patches);
-        let written = Chosen::of(slots, |slot| slot.write != Write::Separations);
-        let begun = Chosen::of(slots, |slot| slot.takes_part);
+        let written = SelectedSlots::of(slots, |slot| slot.write != Write::Separations);
+        let begun = SelectedSlots::of(slots, |slot| slot.takes_part);
         self.write_rows(first, slots, &written, &mut rows);
         let changes_share =
             |contact: &ContactRow| contact.substep_share != 0.0 && self.share(contact) != contact.substep_share;
@@ -111,15 +111,15 @@ impl Writer<'_> {
             for &i in written.all().iter().filter(|&&i| slots[i as usize].takes_part) {
                 rows.contacts[i as usize].substep_share = self.share(&rows.contacts[i as usize]);
             }
-            self.prepare(&mut rows, begun.all(), What::Begin { separations: true, loads: true });
+            self.prepare(&mut rows, begun.all(), Preparation::Begin { separations: true, loads: true });
         } else {
-            self.prepare(&mut rows, begun.all(), What::Begin { separations: true, loads: false });
+            self.prepare(&mut rows, begun.all(), Preparation::Begin { separations: true, loads: false });
             for &i in begun.all() {
                 let own = i as usize * stride..(i as usize + 1) * stride;
                 let (points, impulses) = (&rows.points[own.clone()], &mut rows.impulses[own]);
                 self.follow_effort(&mut rows.contacts[i as usize], points, impulses);
             }
-            self.prepare(&mut rows, begun.all(), What::Begin { separations: false, loads: true });
+            self.prepare(&mut rows, begun.all(), Preparation::Begin { separations: false, loads: true });
         }
         if self.carry.approach {
             for &i in begun.all() {
@@ -131,15 +131,15 @@ impl Writer<'_> {
     }
 
     /// Writes the values of chosen slots that follow from their manifolds, materials and masses.
-    pub fn write_rows(&self, first: usize, slots: &[Slot], written: &Chosen, rows: &mut SlotRows) {
+    pub fn write_rows(&self, first: usize, slots: &[Slot], written: &SelectedSlots, rows: &mut SlotRows) {
         let stride = points_a_slot(self.patches);
         for &i in written.all() {
             let (slot, i) = (&slots[i as usize], i as usize);
             rows.contacts[i].first_point = ((first + i) * stride) as u32;
             self.write_slot(slot, (first + i, i), rows);
         }
-        let what = What::Masses { tangents: self.carry.tangents, jams: self.may_jam };
-        self.prepare(rows, written.all(), what);
+        let preparation = Preparation::Masses { tangents: self.carry.tangents, jams: self.may_jam };
+        self.prepare(rows, written.all(), preparation);
         if self.patches {
             for &i in written.all() {
                 let contact = &rows.contacts[i as usize];
@@ -151,7 +151,7 @@ impl Writer<'_> {
         }
     }
 
-    fn prepare(&self, rows: &mut SlotRows, slots: &[u32], what: What) {
+    fn prepare(&self, rows: &mut SlotRows, slots: &[u32], preparation: Preparation) {
         let rows = Prepare {
             stride: points_a_slot(self.patches),
             masses: self.masses,
@@ -164,7 +164,7 @@ impl Writer<'_> {
             sags: Shared::new(rows.sags),
             jams: Shared::new(rows.jams),
         };
-        let work = Over { rows: &rows, slots, what };
+        let work = PrepareSlots { rows: &rows, slots, preparation };
         InstructionSet::default().run(&work, 0..slots.len().div_ceil(WIDTH));
     }
 

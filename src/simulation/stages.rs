@@ -366,7 +366,7 @@ impl Stages {
             contacts.sums = events.listen.sums() || world.bodies.iter().any(drives);
             contacts.write(world, detector, config, effort, dt, problem);
             joints.sums = events.listen.sums();
-            effort.note_restless(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
+            effort.note_unbalanced(rest::begin(world, config, dt / config.substeps as f32, contacts, problem));
             joints.write(world, sleep.asleep(), config, effort, dt / config.substeps as f32, problem);
             problem::lay_out(world, sleep.asleep(), config, effort, dt, (contacts, joints), problem);
             problem::write_dampings(world, sleep.asleep(), problem);

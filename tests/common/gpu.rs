@@ -1,4 +1,4 @@
-//! What a test needs of a GPU, and what becomes of a test where that is missing.
+//! Needs of a test of a GPU, and the outcome of a test whose needs are not met.
 //!
 //! Such a test fails, and its line says what is missing and what was found instead. A person who knows that a machine lacks
 //! something says so: `DRYSTONE_ADAPTER=none` leaves out every test of a GPU, and `DRYSTONE_WITHOUT=exact`, `clock` or
@@ -15,7 +15,7 @@ use drystone::{Backend, Gpu};
 
 use super::harness;
 
-/// What a test needs.
+/// A need of a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// An adapter, which compiles plain WGSL.

@@ -29,7 +29,7 @@ fn batch_of(scene: &Scene, config: &SolverConfig, count: usize) -> Result<Batch>
     Batch::of(&scene.world, scene.dt, config, count)
 }
 
-/// What is done to a world before a step, by the number of the world.
+/// Changes a world before a step, by the number of the world.
 fn push(world: usize, step: u64, bodies: &mut World) {
     if step % 20 == 7 {
         let last = bodies.bodies.len() - 1;

@@ -12,7 +12,7 @@ use drystone_scenes::Scene;
 enum Fault {
     /// It is not run.
     Dropped,
-    /// What it leaves behind is changed.
+    /// It changes the results that the backend leaves behind.
     Spoiled(fn(&mut StepProblem)),
 }
 

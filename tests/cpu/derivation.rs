@@ -408,7 +408,7 @@ fn a_sweep_leaves_the_normal_velocity_that_closes_a_gap_or_pushes_out_overlap() 
         let (u, impulse) = pressed(rules, &params, separation, 0.0);
         assert!((u - expected).abs() < 1e-13 && impulse > 0.0, "{rules:?}, {separation} m: {u}, not {expected} m/s");
     }
-    // What has a larger gap than it closes is not touched, and no contact pulls.
+    // A contact with a larger gap than it closes has no impulse, and no contact pulls.
     assert_eq!(pressed(biased, &params, 0.04, 0.0).1, 0.0);
     let half = StepParams { relaxation: 0.5, ..params };
     assert!((pressed(relax, &half, -0.01, 0.0).0 + 1.5).abs() < 1e-13, "half of the correction");

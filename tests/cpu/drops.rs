@@ -400,7 +400,7 @@ impl std::iter::Sum for Outcome {
 fn run(shape: &str, kind: &str, count: usize, seed: u64) -> Outcome {
     let mut random = Random(SplitMix64::new(seed));
     let size = 0.05 * 100_f64.powf(random.unit());
-    // What is smaller than 12 cm topples further within a sixtieth of a second than its thinnest is thick.
+    // A body smaller than 12 cm topples further in a sixtieth of a second than its smallest thickness.
     let dt = if size < 0.12 { 1.0 / 120.0 } else { 1.0 / 60.0 };
     let (terrain, floor) = floor(kind, size, &mut random);
     let mut world = World::new();
@@ -435,7 +435,7 @@ fn run(shape: &str, kind: &str, count: usize, seed: u64) -> Outcome {
                 continue;
             }
             let depth = drop.depth(body, &terrain, moved);
-            // What rolls on a rim lies on points that turn out of the floor within a step.
+            // A body that rolls on a rim lies on points that turn out of the floor within a step.
             let rim = drop.furthest(DVec3::ZERO, DQuat::IDENTITY, DVec3::Y).length();
             let turned = f64::from(body.angular_velocity.length() * dt as f32);
             let beyond = (depth - rim * turned * turned) / drop.bulk;

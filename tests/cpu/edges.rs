@@ -115,7 +115,7 @@ fn travelers() -> Vec<Traveler> {
     ]
 }
 
-/// What a journey over all edges comes to.
+/// The result of a journey over all edges.
 #[derive(Clone, Copy, Debug)]
 struct Journey {
     /// Difference from the speed that friction leaves, over the speed at first.
@@ -250,7 +250,7 @@ fn edges_between_meshes_cost_nothing() {
     assert_edges_cost_nothing(Floor::Tiles, |_, _| true);
 }
 
-/// What is no edge of a flush face still holds: a wall on the floor, a step, and the end of a row.
+/// Edges that are not flush still stop bodies: a wall on the floor, a step, and the end of a row.
 #[test]
 fn a_wall_a_step_and_the_end_of_a_row_are_as_they_were() {
     let end = |build: fn(&mut World), shape: &Shape, speed: f32| {

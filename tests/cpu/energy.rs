@@ -102,7 +102,7 @@ fn a_wheel_inside_of_its_chassis_stays_slow() {
     );
 }
 
-/// What the law is not about is never touched: pendulums, hinges, towers, belts, drums, motors, springs.
+/// The law never acts on worlds that make no energy: pendulums, hinges, towers, belts, drums, motors, springs.
 #[test]
 fn scenes_that_make_no_energy_lose_none_to_the_law() {
     let mut lost = Vec::new();
@@ -122,7 +122,7 @@ fn scenes_that_make_no_energy_lose_none_to_the_law() {
             most = most.max(simulation.world.kinetic_energy());
         }
         println!("{name}: {taken:.3e} J of {most:.3e} J, {refused} steps");
-        // What hits at hundreds of meters a second makes some energy, and so do loops of joints and limbs that fall on stairs.
+        // Hits at hundreds of meters a second make some energy, and so do loops of joints and limbs that fall on stairs.
         let share = match name {
             "bullets" => 0.05,
             "four-bar" | "ragdoll" | "ragdolls" => 0.02,

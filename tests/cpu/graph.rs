@@ -3,7 +3,7 @@
 use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 use proptest::prelude::*;
 
-/// What is wrong with the coloring of `edges`, if anything.
+/// A mistake in the coloring of `edges`, if there is one.
 fn fault(edges: &[Edge], coloring: &Coloring) -> Option<String> {
     let mut seen = coloring.order.clone();
     seen.sort_unstable();

@@ -31,7 +31,7 @@ fn each() -> impl Iterator<Item = impl Fn() -> Box<dyn Backend> + Sync> {
     (0..Cpu::each().count()).map(|i| move || Box::new(Cpu::each().nth(i).expect("counted")) as Box<_>)
 }
 
-/// What of the sets that lanes are written for this processor has: they are all that the tests below can try.
+/// The sets of this processor that have lanes: the tests below can try no others.
 #[test]
 fn the_sets_that_are_tried_are_those_that_the_processor_has() {
     let tried: Vec<String> = each().map(|backend| backend().adapter()).collect();

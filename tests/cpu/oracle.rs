@@ -17,7 +17,7 @@ use drystone_problems::solver::{Solution, solution};
 use drystone_scenes::Scene;
 use glam::{DVec2, DVec3};
 
-/// What the interior point method is asked for: more than that it does not reach.
+/// Tolerance of the interior point method, which reaches no smaller one.
 const ASKED: f64 = 1e-10;
 /// Largest energy of a difference: kinetic energy is what the program is about. Worst measured: 1.1e-12.
 const SAME: f64 = ASKED;

@@ -308,7 +308,7 @@ fn bodies_with_equal_moments_of_inertia_need_no_tensor_and_move_the_same() {
     assert_eq!(problem, with_tensors);
 }
 
-/// A cube that lies, and one that hangs on a joint and bears a heavy ball: from the second step on the joints lend the second cube inertia
+/// A cube that lies, and one that hangs on a joint and bears a heavy ball: from the second step on the joints add inertia to the second cube
 /// across their arms.
 fn one_lies_and_one_hangs() -> World {
     let mut world = row(&cube(), 0.5, 0.0);

@@ -194,7 +194,7 @@ fn answers_are_those_of_all_colliders_one_by_one_in_worlds_that_change() {
             for _ in 0..[0, 1, 10][round % 3] {
                 simulation.step(DT).expect("a step");
             }
-            // What the tree does not know of.
+            // Colliders that are not in the tree.
             let handles: Vec<_> = simulation.world.bodies.handles().collect();
             for _ in 0..if round % 4 == 1 { 20 } else { 2 } {
                 let chosen = handles[random.below(handles.len() as u32) as usize];
@@ -287,7 +287,7 @@ fn a_shape_that_moves_meets_a_plane_where_its_lowest_point_does() {
     assert!((hit.distance - 4.2).abs() < 1e-5 && hit.point.distance(Vec3::new(-0.4, 2.3, 0.0)) < 1e-5, "{hit:?}");
     assert!(hit.normal.distance(Vec3::new(-0.8, 0.6, 0.0)) < 1e-4, "{hit:?}");
     assert!(ray(&Shape::ball(0.5), 3.01).is_none());
-    // What overlaps at the beginning is met at once, whatever the direction.
+    // A shape that overlaps at the beginning is hit at once, in any direction.
     for direction in [Vec3::X, Vec3::NEG_X, Vec3::Y] {
         let start = Vec3::new(0.7, 2.0, 0.0);
         let hit =

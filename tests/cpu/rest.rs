@@ -82,7 +82,7 @@ fn structures_that_are_built_in_place_do_not_sink_and_come_up_again() {
     }
 }
 
-/// What is hard in these cases: friction with a row of its own, no preload, rigid contacts.
+/// The difficulty of these cases: friction with a row of its own, no preload, rigid contacts.
 #[test]
 fn all_rules_begin_at_rest() {
     let tower = |n: &str| Scene::find("tower", &[n.to_owned()]).expect("a scene of the catalogue").world;

@@ -20,7 +20,7 @@ fn scene(name: &str, parameters: &[&str]) -> World {
     Scene::find(name, &parameters).expect(name).world
 }
 
-/// What a step counts, without times.
+/// The counts of a step, without times.
 fn counts(stats: &StepStats) -> impl PartialEq + std::fmt::Debug {
     let StepStats { pairs, computed, manifolds, points, joints, colors, overflow, asleep, efforts, dispatches, .. } =
         *stats;

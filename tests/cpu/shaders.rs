@@ -1,8 +1,8 @@
 //! The shaders as naga reads them, without a GPU.
 
 mod exact;
+mod guarded;
 mod layouts;
-mod steered;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -122,7 +122,7 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
     }
 }
 
-/// What a pass writes the next one reads, whichever thread that is. On an adapter whose subgroup is as wide as the workgroup a
+/// A pass reads the results of the pass before, whichever threads wrote them. On an adapter whose subgroup is as wide as the workgroup a
 /// missing barrier shows in no result.
 #[test]
 fn every_pass_of_the_one_dispatch_kernel_ends_with_a_barrier() {
@@ -217,7 +217,7 @@ fn the_series_of_a_rotation_has_the_coefficients_of_its_double() {
     let named = |f: &&naga::Function| f.name.as_deref() == Some("exp_rotation");
     let function = module.functions.iter().map(|(_, f)| f).find(named).expect("the function");
     let magnitude = |e: &naga::Expression| match e {
-        // What is larger belongs to the cut.
+        // Larger values belong to the cut.
         naga::Expression::Literal(naga::Literal::F32(x)) if x.abs() <= 1.0 => Some(x.abs().to_bits()),
         _ => None,
     };

@@ -322,7 +322,7 @@ fn a_mirrored_world_keeps_the_bits_of_what_has_single_points() {
     assert_apart("a ball in the mirror", &Case::scene("sphere-plane"), &mirrored(), 120, 0.0);
 }
 
-/// What is not exact: a turn rounds every direction, and a move leaves positions fewer digits (3.8e-6 m at 64 m). In a mirror, after a turn or in
+/// Two changes are not exact: a turn rounds every direction, and a move leaves positions fewer digits (3.8e-6 m at 64 m). In a mirror, after a turn or in
 /// another order the points of a contact and the contacts are swept in another order, so that sweeps that have not converged leave other impulses, and
 /// four points share the friction of a face otherwise. Bounds are three times what was measured.
 #[test]
@@ -370,7 +370,7 @@ fn worlds_that_are_turned_moved_mirrored_and_reordered_move_accordingly() {
 
 /// With more sweeps the mirror, the turn and the order matter less, m apart with 1, 4, 16 and 64 sweeps a substep: boxes of a pile that have just met
 /// 4.2e-4, 1.1e-4, 6e-8 and 0 in the mirror; a wall 7e-6, 4e-6, 2e-6 and 2e-6; a pushed tower after two steps 1.9e-4, 5e-5, 8e-5 and 1.6e-5 turned.
-/// What is left is friction: how four points of a face share it has more than one solution.
+/// Friction remains: four points of a face can share it in more than one way.
 #[test]
 fn what_a_mirror_and_an_order_change_is_sweeps_that_have_not_converged() {
     let after = |spec: &str, symmetry: &Symmetry, sweeps: u32, steps: usize| {

@@ -1,4 +1,4 @@
-//! What a program takes along with the library.
+//! The crates that a program gets with the library.
 
 use std::collections::BTreeSet;
 use std::process::Command;

@@ -68,7 +68,7 @@ fn identifier(text: &str) -> &str {
     &text[..text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len())]
 }
 
-/// What the crate's root gives on under a shorter name, and the module that it comes from.
+/// The items that the crate's root exports under a shorter name, each with its module.
 fn re_exports() -> BTreeMap<&'static str, &'static str> {
     let lines = LIB.split(';').filter_map(|statement| statement.trim_start().strip_prefix("pub use "));
     let names = |line: &'static str| {

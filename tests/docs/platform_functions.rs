@@ -46,7 +46,7 @@ const FUNCTIONS: &[&str] = &[
     "from_rotation_arc",
 ];
 
-/// What may: a file or folder, the name, and why no step depends on it.
+/// Allowed uses: a file or folder, the name, and why no step depends on it.
 const ALLOWED: &[(&str, &str, &str)] = &[
     ("problems/src/solver/", "hypot", "solves one contact problem in double precision"),
     ("problems/src/solver/", "ln", "the time that Newton's method takes"),

@@ -55,7 +55,7 @@ fn every_instruction_set_has_the_golden_hashes() {
         let name = cpu.adapter();
         assert_golden(&name, &rows_on(Box::new(cpu), 1));
     }
-    // What the processor lacks is said by `the_sets_that_are_tried_are_those_that_the_processor_has`, in tests/cpu/lanes.rs.
+    // `the_sets_that_are_tried_are_those_that_the_processor_has` in tests/cpu/lanes.rs names the sets that the processor lacks.
 }
 
 #[test]

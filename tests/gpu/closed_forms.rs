@@ -111,7 +111,7 @@ fn sag_of_two_cubes(backend: Box<dyn Backend>, frequency: f32, preload_rate: f32
     [0.5 - lower, 1.0 - (upper - lower)]
 }
 
-/// What it must be: overlap = F / (m w²) for each of four corners, m the mass that a corner feels: a quarter of the cube
+/// The closed form: overlap = F / (m w²) for each of four corners, m the mass that a corner feels: a quarter of the cube
 /// against the ground, an eighth of it between two cubes, where inverse masses add.
 fn soft_contact_law(frequency: f64) -> [f64; 2] {
     let w = 2.0 * PI * frequency * 120.0;
@@ -295,7 +295,7 @@ fn bounce(backend: Box<dyn Backend>, mass: f32, restitution: f32) -> [f64; 2] {
     [0, 1].map(|i| after.bodies[i].linear_velocity.x.into())
 }
 
-/// What they must be.
+/// Their closed forms.
 fn newton(m: f64, e: f64) -> [f64; 2] {
     let momentum = 3.0 - m;
     [(momentum - m * e * 4.0) / (1.0 + m), (momentum + e * 4.0) / (1.0 + m)]

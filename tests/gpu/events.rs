@@ -1,4 +1,4 @@
-//! What a simulation tells of the bodies that meet: contacts that begin and end, hits, and the impulses of whole steps.
+//! Events: contacts that begin and end, hits, and the impulses of whole steps.
 
 use crate::common::sample::one_in;
 use crate::common::state::reference;

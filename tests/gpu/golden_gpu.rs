@@ -1,4 +1,4 @@
-//! Exact mode on a GPU has the golden hashes, by SPIR-V and by steered WGSL.
+//! Exact mode on a GPU has the golden hashes, by SPIR-V and by guarded WGSL.
 
 #[path = "../golden/scenes/mod.rs"]
 mod scenes;
@@ -16,7 +16,7 @@ tests! {
         exact_mode_has_the_golden_hashes,
     }
     any_gpu {
-        steered_wgsl_has_golden_hashes,
+        guarded_wgsl_has_golden_hashes,
     }
 }
 
@@ -24,8 +24,8 @@ fn exact_mode_has_the_golden_hashes() {
     have_the_golden_hashes(gpu::exact(), one_in(5));
 }
 
-fn steered_wgsl_has_golden_hashes() {
-    let options = GpuOptions { exact: true, steered: true, ..GpuOptions::default() };
+fn guarded_wgsl_has_golden_hashes() {
+    let options = GpuOptions { exact: true, guarded: true, ..GpuOptions::default() };
     // Fewer scenes: the driver takes nearly three times as long to compile these shaders.
     have_the_golden_hashes(Gpu::open(options).expect("an adapter"), 3 * one_in(5));
 }

@@ -43,7 +43,7 @@ tests! {
         a_problem_too_large_for_the_adapter_is_refused_by_name,
         any_adapter_can_be_measured_against_the_processor,
         pipelines_stay_from_one_run_to_the_next,
-        steered_wgsl_runs_many_passes_to_their_end,
+        guarded_wgsl_runs_many_passes_to_their_end,
     }
     timed_gpu {
         a_device_tells_how_long_it_was_at_what,
@@ -371,7 +371,7 @@ fn pipelines_stay_from_one_run_to_the_next() {
 }
 
 /// 960 passes over a small world. In one dispatch the software adapter left them before the last ones.
-fn steered_wgsl_runs_many_passes_to_their_end() {
+fn guarded_wgsl_runs_many_passes_to_their_end() {
     let hash = |backend: Box<dyn Backend>| {
         let Scene { world, dt, .. } = Scene::find("pile", &["n=60".into()]).expect("a scene of the catalogue");
         let config = SolverConfig::default().with(|c| c.substeps = 160);
@@ -382,6 +382,6 @@ fn steered_wgsl_runs_many_passes_to_their_end() {
         simulation.hash()
     };
     let submission = std::time::Duration::from_secs(60);
-    let options = GpuOptions { exact: true, steered: true, submission, ..GpuOptions::default() };
+    let options = GpuOptions { exact: true, guarded: true, submission, ..GpuOptions::default() };
     assert_eq!(hash(Box::new(Gpu::open(options).expect("an adapter"))), hash(reference()));
 }

@@ -293,7 +293,7 @@ fn rows_that_are_not_there_are_refused() {
     assert!(line.to_string().starts_with("contacts written again: a row does not exist"), "{line}");
 }
 
-/// What each of the last steps of a scene moved to the device and back, and the simulation.
+/// The traffic to the device and back in each of the last steps of a scene, and the simulation.
 fn traffic_of(scene: &Scene, steps: u32, last: u32) -> (Vec<Traffic>, Simulation) {
     let mut simulation = simulation(scene, &SolverConfig::default().without_sleep(), Box::new(gpu::own_plain()));
     let mut all: Vec<_> = (0..steps).map(|_| simulation.step(scene.dt).expect("a step").traffic).collect();
@@ -305,7 +305,7 @@ fn all_rows(problem: &StepProblem) -> usize {
     rows(problem).iter().map(Vec::len).sum::<usize>() + size_of_val(&problem.masses[..])
 }
 
-/// What comes back from every step.
+/// The bytes that come back from every step.
 fn moved(problem: &StepProblem) -> u64 {
     let of_contacts = size_of_val(&problem.impulses[..]);
     (size_of_val(&problem.bodies[..]) + of_contacts + size_of::<ConvergenceRow>() + size_of::<MomentumRow>()) as u64

@@ -1,4 +1,4 @@
-//! What the laws are about, in f64, from a world between two steps: energy, momentum, gaps of joints.
+//! The quantities of the laws, in f64, from a world between two steps: energy, momentum, gaps of joints.
 
 use std::f64::consts::{PI, TAU};
 

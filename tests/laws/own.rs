@@ -155,7 +155,7 @@ fn a_world_that_keeps_the_laws_breaks_none() {
     let mut world = bar_and_ball();
     world.bodies[1].force = Vec3::Y;
     assert_eq!(verdict(world).broken(), ["energy", "lasting", "momentum", "spin"]);
-    // What nothing can hold: a joint whose anchors are 1 m apart.
+    // Nothing can hold a joint whose anchors are 1 m apart.
     let mut world = bar_and_ball();
     world.join(Joint::to_world(1, Vec3::ZERO, Vec3::X * 3.0));
     assert!(verdict(world).broken().contains(&"gap"));

@@ -28,7 +28,7 @@ use laws::draw::{Drawn, Family, Kind};
 use laws::run::{self, Case, Verdict};
 use laws::shrink::{Cause, shrunk};
 
-/// What the command line asks for.
+/// The options of the command line.
 struct Options {
     families: Vec<Family>,
     kinds: Vec<Kind>,

@@ -47,7 +47,7 @@ impl Case {
     }
 }
 
-/// What a run came to.
+/// The result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Verdict {
     /// Why a step was refused, or a world has numbers that are not finite.
@@ -141,7 +141,7 @@ fn open_joints(world: &World) -> BTreeSet<usize> {
 fn push(world: &World, limit: f64, overlaps: &Overlaps, depth: f64, open: &BTreeSet<usize>) -> f64 {
     let count = world.bodies.len();
     let moves = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
-    // What cannot move is one body, behind the others.
+    // All immovable bodies count as one, after the others.
     let place = |i: usize| if moves(i) { i } else { count };
     let mut edges: Vec<(usize, usize, u32)> = overlaps.iter().map(|&[a, b]| (place(a), place(b), 1)).collect();
     for (k, joint) in world.joints.iter().enumerate() {
@@ -433,7 +433,7 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
     verdict.scale += given;
     (verdict.rise, verdict.excess, verdict.above_start) = (passivity.rise, passivity.excess, passivity.above_start);
     if alone {
-        // What has as little energy as law 1 leaves rests.
+        // A world rests if it has no more energy than law 1 allows.
         let rest = (2.0 * start.mass * SHARE_OF_WEIGHT * weight).sqrt();
         let share = |drift: f64, whole: f64| if whole > rest { drift / whole } else { 0.0 };
         verdict.drift = Some([share(drift[0], momenta + start.momentum.length()), share(drift[1], spins)]);

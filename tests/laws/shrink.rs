@@ -5,7 +5,7 @@ use drystone::{Axis, Body, BodyKind, Bounds, Drive, Joint, Linear, MassPropertie
 
 use super::run::{Case, Verdict, run};
 
-/// What is to stay as a world shrinks.
+/// The broken law that has to stay broken as a world shrinks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
     /// A gain of energy of at least this share, above what the world began with.

@@ -19,7 +19,7 @@ pub fn groups(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
 /// Those that are lost or break law 1, the worst first.
 pub fn worst(rows: &[Row]) -> Vec<&Row> {
     let mut broken: Vec<_> = rows.iter().filter(|(_, (v, _))| v.lost.is_some() || v.excess > 0.0).collect();
-    // What comes back of energy that was lost counts less than what is gained.
+    // Energy that was lost and comes back counts less than new energy.
     let size = |(_, (v, _)): &Row| {
         if v.lost.is_some() { f64::INFINITY } else { v.lasting_gain().max(1e-9 * v.gain()) }
     };

@@ -1,4 +1,4 @@
-//! What the entries of the catalogue say should hold, at default settings and in small.
+//! The claims of the catalogue's entries, with default settings and small sizes.
 
 use drystone::glam::Vec3;
 use drystone::metrics::{in_place, rms_speed};

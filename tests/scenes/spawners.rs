@@ -67,7 +67,7 @@ fn a_spawner_waits_while_its_place_is_taken() {
     let group = |bit: u32| Groups { membership: bit, filter: bit };
     let ball = Body::dynamic().shape(Shape::ball(0.3)).position(0.0, 3.0, 0.0).groups(group(1));
     scene.spawners.push(Spawner { count: Some(20), ..Spawner::new(ball, 1) });
-    // What it meets is not in its way: fixed bodies, sensors, and what is of other groups.
+    // Fixed bodies, sensors and bodies of other groups do not block it.
     scene.world.add(Body::fixed().sensor(Shape::ball(5.0)));
     scene.world.add(Body::fixed().shape(Shape::ball(0.1)).position(0.0, 3.39, 0.0));
     let other = Body::kinematic().shape(Shape::ball(0.3)).position(0.0, 3.0, 0.0);

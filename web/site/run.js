@@ -34,7 +34,7 @@ const rates = { steps: 0, pictures: 0 };
 /// Wanted tilts of the board.
 export const tilts = new maze.Tilts();
 tilts.listens = () => game !== null;
-/// What a person can drive in the run: "character", "vehicle" or null.
+/// The body that a person can drive in the run: "character", "vehicle" or null.
 export let drives = null;
 const steering = new Steering(() => drives);
 

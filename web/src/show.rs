@@ -150,7 +150,7 @@ impl Show {
         Ok(())
     }
 
-    /// What a person drives: `character`, `vehicle`, or nothing.
+    /// The body that a person drives: `character`, `vehicle`, or nothing.
     pub fn drives(&self) -> Option<String> {
         self.live.driver.map(|driver| if driver.can_jump() { "character" } else { "vehicle" }.into())
     }

@@ -4,7 +4,7 @@ export const WEBGPU = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--
 
 /// What Chromium itself says where it has no adapter for WebGPU and a page asks for one, and where software draws a canvas of WebGL.
 const OF_CHROMIUM = /^No available adapters\.$|^Failed to create WebGPU Context Provider$|GL Driver Message .*Performance.*ReadPixels/;
-/// What it says where a test tells the tilt of the device.
+/// The browser's message where a test sets the tilt of the device.
 const OF_TILTS = /^A reload is required so that the existing .*Sensor/;
 
 export class Browser {

@@ -1,4 +1,4 @@
-// What was checked: a line each.
+// The checks so far: a line each.
 export class Checks {
   passed = 0;
   failed = [];

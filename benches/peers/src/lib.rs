@@ -1,7 +1,7 @@
 //! Other engines on drystone's scenes: each takes the same [`World`](drystone::World), steps it by itself and gives poses and
 //! velocities back, so that drystone's own [`measure`](drystone_cli::report::comparison::measure) times and scores all of them.
 //!
-//! What is the same for all: shapes, masses and inertias, friction (geometric mean) and restitution (larger), joints,
+//! The same for all engines: shapes, masses and inertias, friction (geometric mean) and restitution (larger), joints,
 //! gravity, forces, the length of a step. Nothing sleeps and nothing is damped. Everything else (speculative margins, reuse of
 //! contacts, friction model, restitution threshold) is what an engine does unless told otherwise.
 

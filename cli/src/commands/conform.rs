@@ -28,7 +28,7 @@ pub struct ConformArgs {
     exact: bool,
     /// Check only exact shaders in guarded WGSL, as on adapters that do not accept SPIR-V.
     #[arg(long, conflicts_with_all = ["exact", "plain"])]
-    steered: bool,
+    guarded: bool,
     /// Check only plain WGSL.
     #[arg(long)]
     plain: bool,
@@ -59,8 +59,8 @@ impl ConformArgs {
         let shader = self.perturb.then_some(one_percent_off as fn(&str, String) -> String);
         let faults = Faults { shader, ..Faults::default() };
         let options = ConformOptions {
-            gpu: GpuOptions { name: self.adapter.clone(), steered: self.steered, faults, ..GpuOptions::default() },
-            modes: match (self.exact || self.steered, self.plain) {
+            gpu: GpuOptions { name: self.adapter.clone(), guarded: self.guarded, faults, ..GpuOptions::default() },
+            modes: match (self.exact || self.guarded, self.plain) {
                 (true, _) => vec![Mode::Exact],
                 (_, true) => vec![Mode::Plain],
                 _ => all.modes,

@@ -13,14 +13,14 @@ use drystone_view::Picture;
 pub struct Output {
     path: PathBuf,
     /// Dropped before the draft, so that the writer ends first.
-    kind: Kind,
+    kind: Format,
     draft: Draft,
     size: (u32, u32),
     /// Duration of a GIF frame (1/100 s).
     delay: u16,
 }
 
-enum Kind {
+enum Format {
     Png(File),
     Gif(Box<gif::Encoder<BufWriter<File>>>),
     Frames(u32),
@@ -53,21 +53,21 @@ impl Output {
         let kind = match path.extension().and_then(|e| e.to_str()) {
             _ if is_folder(path) => {
                 std::fs::create_dir(draft.place()).map_err(Error::file(path))?;
-                Kind::Frames(0)
+                Format::Frames(0)
             }
-            Some("png") => Kind::Png(draft.create()?),
+            Some("png") => Format::Png(draft.create()?),
             Some("gif") => {
                 let side =
                     |s: u32| u16::try_from(s).map_err(|_| Error::input(format!("{s} pixels: a GIF has at most 65535")));
                 let mut encoder = gif::Encoder::new(BufWriter::new(draft.create()?), side(size.0)?, side(size.1)?, &[])
                     .map_err(|e| failed(path, e))?;
                 encoder.set_repeat(gif::Repeat::Infinite).map_err(|e| failed(path, e))?;
-                Kind::Gif(Box::new(encoder))
+                Format::Gif(Box::new(encoder))
             }
             Some("mp4") => {
                 // Report a path that cannot be written before ffmpeg starts.
                 drop(draft.create()?);
-                Kind::Mp4(ffmpeg(draft.place(), size, rate)?)
+                Format::Mp4(ffmpeg(draft.place(), size, rate)?)
             }
             _ => return Err(unknown(path)),
         };
@@ -78,21 +78,21 @@ impl Output {
     pub fn add(&mut self, picture: &Picture) -> Result<()> {
         let path = &self.path;
         match &mut self.kind {
-            Kind::Png(file) => write_png(file, picture).map_err(|e| failed(path, e)),
-            Kind::Frames(count) => {
+            Format::Png(file) => write_png(file, picture).map_err(|e| failed(path, e)),
+            Format::Frames(count) => {
                 let folder = self.draft.place();
                 let name = format!("{count:05}.png");
                 *count += 1;
                 let file = File::create(folder.join(&name)).map_err(Error::file(path.join(&name)))?;
                 write_png(&file, picture).map_err(|e| failed(path, e))
             }
-            Kind::Gif(encoder) => {
+            Format::Gif(encoder) => {
                 let (width, height) = (self.size.0 as u16, self.size.1 as u16);
                 let mut frame = gif::Frame::from_rgba_speed(width, height, &mut picture.rgba.clone(), 10);
                 frame.delay = self.delay;
                 encoder.write_frame(&frame).map_err(|e| failed(path, e))
             }
-            Kind::Mp4(child) => {
+            Format::Mp4(child) => {
                 let Some(pipe) = &mut child.0.stdin else { return Ok(()) };
                 pipe.write_all(&picture.rgba).map_err(|e| failed(path, format!("ffmpeg ended early: {e}")))
             }
@@ -102,18 +102,18 @@ impl Output {
     pub fn finish(self) -> Result<()> {
         let Self { path, draft, kind, .. } = self;
         match kind {
-            Kind::Gif(encoder) => {
+            Format::Gif(encoder) => {
                 let mut file = encoder.into_inner().map_err(|e| failed(&path, e))?;
                 file.flush().map_err(Error::file(&path))?;
             }
-            Kind::Mp4(mut child) => {
+            Format::Mp4(mut child) => {
                 drop(child.0.stdin.take());
                 let status = child.0.wait().map_err(Error::file(&path))?;
                 if !status.success() {
                     return Err(failed(&path, format!("ffmpeg ended with {status}")));
                 }
             }
-            Kind::Frames(_) if path.is_dir() => {
+            Format::Frames(_) if path.is_dir() => {
                 // An existing folder keeps its other files.
                 for entry in std::fs::read_dir(draft.place()).map_err(Error::file(&path))? {
                     let entry = entry.map_err(Error::file(&path))?;
@@ -121,7 +121,7 @@ impl Output {
                 }
                 return Ok(());
             }
-            Kind::Png(_) | Kind::Frames(_) => {}
+            Format::Png(_) | Format::Frames(_) => {}
         }
         draft.keep()
     }

@@ -146,7 +146,7 @@ fn a_run_writes_its_end_as_a_scene_file_that_can_be_run_again() {
     // 6 boxes came, the sixth after 600 steps, and the first left after 490.
     assert!((3..=5).contains(&boxes), "{boxes} boxes");
     assert_eq!((&file["spawners"][0]["first"], &file["spawners"][0]["every"]), (&20.into(), &120.into()));
-    // What is written is what is there: without steps, it is written again.
+    // The program writes the present state: without steps, it writes the same file again.
     folder.output("run later.json --steps 0 --out-scene again.json");
     let again = std::fs::read_to_string(folder.path().join("again.json")).expect("the file");
     let steps = |steps: u32| format!("\"steps\":{steps},");

@@ -114,7 +114,7 @@ fn a_command_ends_when_nobody_reads_what_it_prints() {
     let rows = folder.read("cases.csv");
     let cases: BTreeSet<_> = rows.lines().skip(1).filter_map(|row| row.split(',').next()).collect();
     assert!((1..4).contains(&cases.len()), "{cases:?}");
-    // What was written before is named.
+    // The message names the files that were written before.
     let mut child = folder.drystone("run drop --steps 2 --out motion.csv").spawn().expect("the command starts");
     drop(child.stdout.take());
     let (line, _) = last(&child.wait_with_output().expect("it ends"));

@@ -145,8 +145,8 @@ impl Gpu {
         let (adapter, summary) = adapter::find(options.adapter, &options.name).await?;
         let loss = losses.get(lost).copied();
         let shaders = match options.exact {
-            true if summary.takes_spirv && !options.steered => Shaders::Spirv,
-            true => Shaders::Steered,
+            true if summary.takes_spirv && !options.guarded => Shaders::Spirv,
+            true => Shaders::Guarded,
             false => Shaders::Plain,
         };
         let (device, queue) = adapter::open(&adapter, shaders == Shaders::Spirv).await?;

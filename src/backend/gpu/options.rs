@@ -26,7 +26,7 @@ pub struct GpuOptions {
     /// adapter of a machine.
     pub exact: bool,
     /// Whether exact mode uses the guarded WGSL even if the adapter accepts SPIR-V.
-    pub steered: bool,
+    pub guarded: bool,
     /// The folder in which compiled pipelines stay from one run to the next, so that later runs do not compile.
     /// [`BackendKind::open`](crate::backend::BackendKind::open) and [`choose`](crate::backend::choose) read the
     /// environment variable `DRYSTONE_CACHE`. Vulkan only. A modified file is ignored.
@@ -51,7 +51,7 @@ impl Default for GpuOptions {
             adapter: AdapterChoice::Best,
             name: String::new(),
             exact: false,
-            steered: false,
+            guarded: false,
             cache: None,
             buffer_limit: u64::MAX,
             memory: u64::MAX,

@@ -22,7 +22,7 @@ pub(super) enum Shaders {
     /// As SPIR-V that forbids reassociation.
     Spirv,
     /// As WGSL with guarded arithmetic.
-    Steered,
+    Guarded,
 }
 
 /// The pipelines of a device.
@@ -99,7 +99,7 @@ impl Pipelines {
             source = fault(name, source);
         }
         let mut reflected = Reflected::new(name, &source)?;
-        if self.shaders == Shaders::Steered {
+        if self.shaders == Shaders::Guarded {
             source = exact_wgsl(&reflected, &source);
             // Includes the buffer with the guard number.
             reflected = Reflected::new(name, &source)?;

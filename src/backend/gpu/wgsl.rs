@@ -89,7 +89,7 @@ impl Program {
 }
 
 /// The rows of a kernel.
-enum Over {
+enum RowRange {
     /// This number of rows.
     Count(&'static str),
     /// The rows of the colors of a pass.
@@ -100,46 +100,52 @@ enum Over {
 
 /// The files of a kernel, its rows, and the call of its function: for one `row`, or for all rows if the kernel finds
 /// them itself.
-fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
+fn kernel_text(kernel: Kernel) -> (&'static [&'static str], RowRange, String) {
     let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
     match kernel {
         Kernel::IntegrateVelocities { warm_start, from_start } => {
             let call = format!("integrate_velocity({warm_start}, {from_start}, row)");
-            (&[part!("integrate_velocities")], Over::Colors, call)
+            (&[part!("integrate_velocities")], RowRange::Colors, call)
         }
-        Kernel::BeginChanges => (&[part!("begin_changes")], Over::Colors, "begin_change(row)".into()),
-        Kernel::EndChanges => (&[part!("end_changes")], Over::Colors, "end_change(row)".into()),
+        Kernel::BeginChanges => (&[part!("begin_changes")], RowRange::Colors, "begin_change(row)".into()),
+        Kernel::EndChanges => (&[part!("end_changes")], RowRange::Colors, "end_change(row)".into()),
         Kernel::IntegrateTorques { from_start } => {
-            (&[part!("integrate_torques")], Over::Colors, format!("integrate_torque({from_start}, row)"))
+            (&[part!("integrate_torques")], RowRange::Colors, format!("integrate_torque({from_start}, row)"))
         }
         Kernel::DampVelocities { from_start } => {
-            (&[part!("damp_velocities")], Over::Colors, format!("damp_velocity({from_start}, row)"))
+            (&[part!("damp_velocities")], RowRange::Colors, format!("damp_velocity({from_start}, row)"))
         }
         Kernel::IntegrateGyroscopic { from_start } => {
-            (&[part!("integrate_gyroscopic")], Over::Colors, format!("turn_spin({from_start}, row)"))
+            (&[part!("integrate_gyroscopic")], RowRange::Colors, format!("turn_spin({from_start}, row)"))
         }
         Kernel::IntegratePositions { from_start } => {
-            (&[part!("integrate_positions")], Over::Colors, format!("integrate_position({from_start}, row)"))
+            (&[part!("integrate_positions")], RowRange::Colors, format!("integrate_position({from_start}, row)"))
         }
-        Kernel::ClearImpulses => (&[part!("clear_impulses")], Over::Colors, "clear_contact(row)".into()),
-        Kernel::SumImpulses { first } => (&[part!("sum_impulses")], Over::Colors, format!("sum_contact({first}, row)")),
+        Kernel::ClearImpulses => (&[part!("clear_impulses")], RowRange::Colors, "clear_contact(row)".into()),
+        Kernel::SumImpulses { first } => {
+            (&[part!("sum_impulses")], RowRange::Colors, format!("sum_contact({first}, row)"))
+        }
         Kernel::SumJointImpulses { first } => {
-            (&[part!("sum_joint_impulses")], Over::Colors, format!("sum_joint({first}, row)"))
+            (&[part!("sum_joint_impulses")], RowRange::Colors, format!("sum_joint({first}, row)"))
         }
-        Kernel::BeginSweep { first } => (&[part!("begin_sweep")], Over::Count("1u"), format!("begin_sweep({first})")),
+        Kernel::BeginSweep { first } => {
+            (&[part!("begin_sweep")], RowRange::Count("1u"), format!("begin_sweep({first})"))
+        }
         Kernel::Extrapolate { first, measured } => {
-            (&[part!("extrapolate")], Over::Own, format!("extrapolate({first}, {measured}, first, stride)"))
+            (&[part!("extrapolate")], RowRange::Own, format!("extrapolate({first}, {measured}, first, stride)"))
         }
-        Kernel::MeasureStep => {
-            (&[part!("lib/sum"), part!("measure_step")], Over::Own, "measure_step(thread, group.x, groups.x)".into())
-        }
+        Kernel::MeasureStep => (
+            &[part!("lib/sum"), part!("measure_step")],
+            RowRange::Own,
+            "measure_step(thread, group.x, groups.x)".into(),
+        ),
         Kernel::UpdateMomentum => {
-            (&[part!("lib/sum"), part!("update_momentum")], Over::Own, "update_momentum(thread)".into())
+            (&[part!("lib/sum"), part!("update_momentum")], RowRange::Own, "update_momentum(thread)".into())
         }
         Kernel::WarmStartJoints { axes } => {
-            (of_joints!(axes, "warm_start_joints"), Over::Colors, "warm_start_joint(row)".into())
+            (of_joints!(axes, "warm_start_joints"), RowRange::Colors, "warm_start_joint(row)".into())
         }
-        Kernel::TurnInertias => (&[part!("turn_inertias")], Over::Colors, "turn_inertia(row)".into()),
+        Kernel::TurnInertias => (&[part!("turn_inertias")], RowRange::Colors, "turn_inertia(row)".into()),
         Kernel::BeginSystems => {
             let parts = &[
                 part!("lib/pair"),
@@ -148,32 +154,32 @@ fn kernel_text(kernel: Kernel) -> (&'static [&'static str], Over, String) {
                 part!("lib/joint_system"),
                 part!("begin_systems"),
             ];
-            (parts, Over::Colors, "begin_system(row)".into())
+            (parts, RowRange::Colors, "begin_system(row)".into())
         }
         Kernel::MeasureJoints(rules) => {
-            (of_joints!(true, "measure_joints"), Over::Colors, with("measure_joint", rules))
+            (of_joints!(true, "measure_joints"), RowRange::Colors, with("measure_joint", rules))
         }
         Kernel::SolveJointSystems(rules) => {
             let parts = &[part!("lib/joint_system"), part!("solve_joint_systems")];
-            (parts, Over::Colors, with("solve_system", rules))
+            (parts, RowRange::Colors, with("solve_system", rules))
         }
         Kernel::ApplyJointChanges(rules) => {
-            (of_joints!(true, "apply_joint_changes"), Over::Colors, with("apply_joint_change", rules))
+            (of_joints!(true, "apply_joint_changes"), RowRange::Colors, with("apply_joint_change", rules))
         }
         Kernel::SolveJoints(rules) => {
-            (of_joints!(rules.axes, "solve_joints"), Over::Colors, with("solve_joint", rules))
+            (of_joints!(rules.axes, "solve_joints"), RowRange::Colors, with("solve_joint", rules))
         }
-        Kernel::SolveAxes(rules) => (of_joints!(true, "solve_axes"), Over::Colors, with("solve_swept_axes", rules)),
+        Kernel::SolveAxes(rules) => (of_joints!(true, "solve_axes"), RowRange::Colors, with("solve_swept_axes", rules)),
         Kernel::WarmStart(rules) => {
-            (&[part!("lib/pair"), part!("warm_start")], Over::Colors, with("warm_start_contact", rules))
+            (&[part!("lib/pair"), part!("warm_start")], RowRange::Colors, with("warm_start_contact", rules))
         }
         Kernel::SolveContacts(rules) => {
             let parts = &[part!("lib/pair"), part!("lib/contact"), part!("lib/friction"), part!("solve_contacts")];
-            (parts, Over::Colors, with("solve_contact", rules))
+            (parts, RowRange::Colors, with("solve_contact", rules))
         }
         Kernel::ApplyRestitution(rules) => (
             &[part!("lib/pair"), part!("lib/contact"), part!("apply_restitution")],
-            Over::Colors,
+            RowRange::Colors,
             with("restitute_contact", rules),
         ),
     }
@@ -231,9 +237,9 @@ fn of_plan(kernels: &[Kernel], threads: u32, fused: bool, range: &str, main: imp
             }
         }
         calls.push(match over {
-            Over::Own => format!("{call};"),
-            Over::Count(count) => over_count(count, &call),
-            Over::Colors => {
+            RowRange::Own => format!("{call};"),
+            RowRange::Count(count) => over_count(count, &call),
+            RowRange::Colors => {
                 let [rows, colors] = ["over_rows", "over_colors"].map(|name| format!("{name}_{at}"));
                 loops += &part!("lib/over_rows").replace("over_rows", &rows).replace("over_row(row)", &call);
                 if fused {

@@ -16,7 +16,7 @@ use super::bindings::Binding;
 use super::reflect::Reflected;
 
 /// The guard functions, for one number and for vectors of two to four.
-const STEERED: [(&str, &str, &str); 4] =
+const GUARDED: [(&str, &str, &str); 4] =
     [("1", "f32", "u32"), ("2", "vec2f", "vec2u"), ("3", "vec3f", "vec3u"), ("4", "vec4f", "vec4u")];
 
 /// The same program. Any compiler that respects integer arithmetic computes it as written.
@@ -34,14 +34,14 @@ pub fn exact_wgsl(reflected: &Reflected, source: &str) -> String {
                 Expression::Binary {
                     op: op @ (BinaryOperator::Add | BinaryOperator::Subtract | BinaryOperator::Multiply),
                     ..
-                } => edits.steer(source, range, op, size),
+                } => edits.guard(source, range, op, size),
                 Expression::Select { .. } => edits.choose(source, range, size),
                 Expression::Unary { op: UnaryOperator::Negate, .. } => edits.negate(source, range, size),
                 _ => {}
             }
         }
     }
-    edits.steer_zeros(source);
+    edits.guard_zeros(source);
     edits.apply(source) + &functions_of(zero(reflected))
 }
 
@@ -62,7 +62,7 @@ fn zero(reflected: &Reflected) -> &'static str {
 fn functions_of(zero: &str) -> String {
     let function = |(size, floats, integers): (&str, &str, &str)| {
         format!(
-            "fn steered_{size}(x: {floats}) -> {floats} {{ return bitcast<{floats}>(bitcast<{integers}>(x) ^ {integers}({zero})); }}
+            "fn guarded_{size}(x: {floats}) -> {floats} {{ return bitcast<{floats}>(bitcast<{integers}>(x) ^ {integers}({zero})); }}
 fn opposite_{size}(x: {floats}) -> {floats} {{ return bitcast<{floats}>(bitcast<{integers}>(x) ^ {integers}(0x80000000u)); }}
 fn chosen_{size}(no: {floats}, yes: {floats}, is: bool) -> {floats} {{
     return bitcast<{floats}>(select(bitcast<{integers}>(no), bitcast<{integers}>(yes), is));
@@ -70,7 +70,7 @@ fn chosen_{size}(no: {floats}, yes: {floats}, is: bool) -> {floats} {{
 "
         )
     };
-    STEERED.into_iter().map(function).collect()
+    GUARDED.into_iter().map(function).collect()
 }
 
 /// Replacements of parts of a text.
@@ -98,7 +98,7 @@ impl Edits {
     }
 
     /// Wraps an operation, or an assignment with an operation, in the guard function.
-    fn steer(&mut self, source: &str, Range { start, end }: Range<usize>, op: BinaryOperator, size: usize) {
+    fn guard(&mut self, source: &str, Range { start, end }: Range<usize>, op: BinaryOperator, size: usize) {
         let text = &source[start..end];
         let sign = match op {
             BinaryOperator::Add => "+",
@@ -106,18 +106,18 @@ impl Edits {
             _ => "*",
         };
         if let Some(at) = text.find(&format!("{sign}=")) {
-            // a += b; becomes a = steered(a + (b));
+            // a += b; becomes a = guarded(a + (b));
             let left = text[..at].trim_end();
             let end = start + text.trim_end().trim_end_matches(';').len();
-            self.add(start + at, 2, format!("= steered_{size}({left} {sign} ("), end);
+            self.add(start + at, 2, format!("= guarded_{size}({left} {sign} ("), end);
             self.add(end, 0, "))".into(), end);
         } else {
-            self.wrap(start..end, 0, format!("steered_{size}("));
+            self.wrap(start..end, 0, format!("guarded_{size}("));
         }
     }
 
     /// Wraps zeros in functions in the guard functions, except zeros that a number is compared with.
-    fn steer_zeros(&mut self, source: &str) {
+    fn guard_zeros(&mut self, source: &str) {
         for (zero, size) in [("0.0", 1), ("vec2f()", 2), ("vec3f()", 3), ("vec4f()", 4)] {
             for (at, _) in source.match_indices(zero) {
                 let (before, after) = (&source[..at], &source[at + zero.len()..]);
@@ -126,7 +126,7 @@ impl Edits {
                 let is_compared = before.trim_end().ends_with(['<', '>', '=']) && !before.trim_end().ends_with(" =");
                 let line = before.rsplit('\n').next().expect("a line");
                 if !(is_part || is_compared || line.starts_with("const ")) {
-                    self.wrap(at..at + zero.len(), 0, format!("steered_{size}("));
+                    self.wrap(at..at + zero.len(), 0, format!("guarded_{size}("));
                 }
             }
         }

@@ -15,7 +15,7 @@ use super::super::carry::Carry;
 use super::super::prepare::{ComputedRow, PoseRow};
 use super::super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
 use super::super::slots::Write;
-use super::super::write::{Chosen, SLOTS_A_TASK, SlotRows, Writer};
+use super::super::write::{SLOTS_A_TASK, SelectedSlots, SlotRows, Writer};
 use super::super::{StepProblem, StepScale, points_a_slot};
 use super::{ContactRows, Materials};
 use crate::collide::{Detector, MAX_POINTS};
@@ -152,7 +152,7 @@ impl ContactRows {
             let mut buffers = Buffers::new(own.len(), stride);
             let slots = &slots.all[own.clone()];
             let mut own_taken = is_taken[own.clone()].iter();
-            let chosen = Chosen::of(slots, |_| *own_taken.next().expect("one a slot") && all_there);
+            let chosen = SelectedSlots::of(slots, |_| *own_taken.next().expect("one a slot") && all_there);
             writer.write_rows(first, slots, &chosen, &mut buffers.slot_rows());
             (own, buffers)
         };

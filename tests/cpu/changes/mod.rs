@@ -1,4 +1,4 @@
-//! What the caller changes between two steps: the next step follows it, whatever it is, or says why not.
+//! Changes by the caller between two steps: the next step follows each of them, or its error says why not.
 
 mod bodies;
 mod joints;

@@ -29,7 +29,7 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
             c.joint_solver = JointSolver::Sweeps;
             c.joint_frequency = frequency;
             c.joint_damping = damping;
-            // What begins beside its joint gets no more energy than this gives.
+            // A body that begins away from its joint gets at most this energy.
             c.push_limit = 100.0;
         });
         let mut simulation = simulation(world, config);

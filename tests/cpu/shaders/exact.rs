@@ -8,7 +8,7 @@ use drystone::stages::backend::shader::{Program, Reflected, exact_spirv};
 use drystone::stages::kernels::Rules;
 use drystone::stages::plan::Kernel;
 
-/// What may make a float, or a vector of floats: reading, moving, choosing, and + - * in a written order.
+/// Operations that may make a float, or a vector of floats: reading, moving, choosing, and + - * in a written order.
 const EXACT: [u32; 14] = [
     55,  // OpFunctionParameter
     57,  // OpFunctionCall

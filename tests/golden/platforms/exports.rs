@@ -1,4 +1,4 @@
-//! What a JavaScript engine calls: numbers only, and text that it reads from memory.
+//! Functions for a JavaScript engine: they take and return numbers, and the engine reads text from memory.
 
 use std::cell::RefCell;
 

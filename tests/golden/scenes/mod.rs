@@ -18,7 +18,7 @@ pub struct Golden {
     /// Length of a step (s).
     pub dt: f32,
     start: Box<dyn Fn() -> (World, SolverConfig)>,
-    /// What is done before each step, which is counted from 0.
+    /// Called before each step with its number, from 0.
     before_step: fn(&mut Simulation, u32),
 }
 

@@ -14,7 +14,7 @@ export const mistakes = [
   // The number of single precision after 1.
   { fails: "pile, exact: WebGPU has the bits of the CPU", script: falling("1.0000001"), scenes: ["pile"], modes: [true], names: [] },
   {
-    fails: "exact: all shaders are steered",
+    fails: "exact: all shaders are guarded",
     script: meddle(`
       const right = drystone.backend;
       drystone.backend = (name) => right(name, false)`),
@@ -52,21 +52,21 @@ async function beside(page, check, scene, isExact) {
 
 export async function run({ open, check, scenes = Object.keys(SCENES), modes = [true, false], names = NAMES, isShort }) {
   const page = await open({ hash: "#scene=stack" });
-  // Notes of each shader that computes whether it is steered.
+  // Notes of each shader that computes whether it is guarded.
   await page.evaluate(() => {
     const right = GPUDevice.prototype.createShaderModule;
     GPUDevice.prototype.createShaderModule = function (given) {
-      if (given.code.includes("@compute")) window.steered.push(given.code.includes("fn steered_1("));
+      if (given.code.includes("@compute")) window.guarded.push(given.code.includes("fn guarded_1("));
       return right.call(this, given);
     };
   });
   for (const isExact of modes) {
-    await page.evaluate(() => (window.steered = []));
+    await page.evaluate(() => (window.guarded = []));
     await page.evaluate((isExact) => window.drystone.backend("both", isExact), isExact);
     for (const scene of scenes) await beside(page, check, scene, isExact);
-    const steered = await page.evaluate(() => window.steered);
-    const [what, holds] = isExact ? ["exact: all shaders are steered", steered.every(Boolean)] : ["plain: no shader is steered", !steered.some(Boolean)];
-    check.holds(what, steered.length > 0 && holds, `${steered.length} shaders`);
+    const guarded = await page.evaluate(() => window.guarded);
+    const [what, holds] = isExact ? ["exact: all shaders are guarded", guarded.every(Boolean)] : ["plain: no shader is guarded", !guarded.some(Boolean)];
+    check.holds(what, guarded.length > 0 && holds, `${guarded.length} shaders`);
   }
   if (!isShort) await alone(open, check);
   if (names.length === 0) return;

@@ -108,7 +108,7 @@ pub struct Bench {
 }
 
 /// A backend with a pool of threads, and the medians of its turns: the five stages and their sum (ms).
-struct Way {
+struct BackendRun {
     backend: Option<Box<dyn Backend>>,
     pool: rayon::ThreadPool,
     turns: Vec<[f64; 6]>,
@@ -120,7 +120,7 @@ struct Case {
     dt: f32,
     simulation: Simulation,
     spawners: Spawners,
-    ways: Vec<Way>,
+    runs: Vec<BackendRun>,
     last: StepStats,
 }
 
@@ -136,14 +136,14 @@ pub fn bench(
 ) -> Result<Bench> {
     let mut cases = Vec::new();
     for spec in specs {
-        let mut ways = Vec::new();
+        let mut runs = Vec::new();
         for &threads in threads {
             for backend in open()? {
-                ways.push(Way { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
+                runs.push(BackendRun { backend: Some(backend), pool: pool(threads)?, turns: Vec::new() });
             }
         }
         let (simulation, spawners, hash, dt) = settled(spec, config)?;
-        cases.push(Case { spec: spec.clone(), hash, dt, simulation, spawners, ways, last: StepStats::default() });
+        cases.push(Case { spec: spec.clone(), hash, dt, simulation, spawners, runs, last: StepStats::default() });
         after_turn();
     }
     interleave(turns, &mut cases, |_, case| {
@@ -180,12 +180,12 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 
 impl Case {
     fn turn(&mut self) -> Result<()> {
-        let Self { simulation, spawners, ways, dt, last, .. } = self;
-        for way in ways {
-            let Some(backend) = way.backend.take() else { continue };
+        let Self { simulation, spawners, runs, dt, last, .. } = self;
+        for run in runs {
+            let Some(backend) = run.backend.take() else { continue };
             let before = simulation.set_backend(backend);
             let mut steps = Vec::with_capacity(TURN);
-            let stepped: Result<()> = way.pool.install(|| {
+            let stepped: Result<()> = run.pool.install(|| {
                 (0..TURN).try_for_each(|_| {
                     spawners.before_step(&mut simulation.world, *dt);
                     *last = simulation.step(*dt)?;
@@ -196,30 +196,30 @@ impl Case {
                     Ok(())
                 })
             });
-            way.backend = Some(simulation.set_backend(before));
+            run.backend = Some(simulation.set_backend(before));
             stepped?;
-            way.turns.push(std::array::from_fn(|i| median(&column(&steps, i))));
+            run.turns.push(std::array::from_fn(|i| median(&column(&steps, i))));
         }
         Ok(())
     }
 
     fn rows(self, config: &SolverConfig) -> Vec<StagesRow> {
-        let Self { spec, hash, dt, mut simulation, ways, last: stats, .. } = self;
+        let Self { spec, hash, dt, mut simulation, runs, last: stats, .. } = self;
         let penetration = simulation.penetration();
         let residual =
             drystone_problems::step_with_residuals(&mut simulation, dt).ok().map(|residuals| residuals.e_vel);
         let world = &simulation.world;
-        let row = |mut way: Way| {
-            let [detect, color, prepare, run, store] = std::array::from_fn(|i| median(&column(&way.turns, i)));
-            let [ms_low, ms, ms_high] = quartiles(&column(&way.turns, 5));
-            let backend = way.backend.take().expect("given back after each turn");
+        let row = |mut measured: BackendRun| {
+            let [detect, color, prepare, run, store] = std::array::from_fn(|i| median(&column(&measured.turns, i)));
+            let [ms_low, ms, ms_high] = quartiles(&column(&measured.turns, 5));
+            let backend = measured.backend.take().expect("given back after each turn");
             let name = backend.name().into();
             StagesRow {
                 scene: spec.clone(),
                 hash: hash.clone(),
                 backend: name,
-                adapter: way.pool.install(move || backend.adapter()),
-                threads: way.pool.current_num_threads(),
+                adapter: measured.pool.install(move || backend.adapter()),
+                threads: measured.pool.current_num_threads(),
                 settings: settings::unusual(config, &["sleep_after"]).join(" "),
                 worlds: world.world_count(),
                 bodies: world.dynamic_count(),
@@ -242,7 +242,7 @@ impl Case {
                 residual,
             }
         };
-        ways.into_iter().map(row).collect()
+        runs.into_iter().map(row).collect()
     }
 }
 

@@ -1,4 +1,4 @@
-//! In steered WGSL no result of an operation on floats reaches another one, and none is chosen, unless through integers.
+//! In guarded WGSL no result of an operation on floats reaches another one, and none is chosen, unless through integers.
 
 use std::collections::BTreeSet;
 
@@ -7,11 +7,11 @@ use naga::{BinaryOperator, Expression, Handle, Literal, ScalarKind, TypeInner};
 use super::every_program;
 use drystone::stages::backend::shader::{Program, Reflected, exact_wgsl};
 
-fn steered(source: &str) -> String {
+fn guarded(source: &str) -> String {
     exact_wgsl(&Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}")), source)
 }
 
-/// What a compiler is free to change: sums and products of floats that something else than integers takes, zeros in them, choices between
+/// Operations that a compiler may change: sums and products of floats that something else than integers takes, zeros in them, choices between
 /// floats, and everything that makes floats in another way than by reading and moving.
 fn free(source: &str) -> BTreeSet<String> {
     let Reflected { module, info, .. } = Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}\n{source}"));
@@ -27,7 +27,7 @@ fn free(source: &str) -> BTreeSet<String> {
         };
         let (mut arguments, mut compared) = (BTreeSet::new(), BTreeSet::new());
         calls(&function.body, &mut |callee, values| {
-            if module.functions[callee].name.as_ref().is_some_and(|name| name.starts_with("steered_")) {
+            if module.functions[callee].name.as_ref().is_some_and(|name| name.starts_with("guarded_")) {
                 arguments.extend(values.iter().copied());
             }
         });
@@ -95,7 +95,7 @@ fn calls(block: &naga::Block, each: EachCall) {
 #[test]
 fn integers_steer_every_sum_product_and_choice() {
     for program in every_program() {
-        assert_eq!(free(&steered(&program.source())), BTreeSet::new(), "{program:?}");
+        assert_eq!(free(&guarded(&program.source())), BTreeSet::new(), "{program:?}");
     }
     // Plain WGSL has hundreds.
     assert!(!free(&every_program()[0].source()).is_empty());
@@ -112,29 +112,29 @@ fn program(text: &str) -> String {
 }
 
 #[test]
-fn what_a_compiler_may_change_is_found_and_steered() {
-    for (text, steered_text) in [
-        ("s = s * x[1] + x[2];", "s = steered_1(steered_1(s * x[1]) + x[2]);"),
-        ("s += x[1] * (s - 1.0);", "s = steered_1(s + (steered_1( x[1] * (steered_1(s - 1.0)))));"),
-        ("v -= v * s;", "v = steered_3(v - (steered_3( v * s)));"),
-        ("v = s * s * v;", "v = steered_3(steered_1(s * s) * v);"),
-        ("s = s * x[1] + 0.0;", "s = steered_1(steered_1(s * x[1]) + steered_1(0.0));"),
-        ("v = vec3f(1.0, 0.0, s) - vec3f();", "v = steered_3(vec3f(1.0, steered_1(0.0), s) - steered_3(vec3f()));"),
-        ("if s > 0.0 { s = 0.05 - 10.0 * s; }", "if s > 0.0 { s = steered_1(0.05 - steered_1(10.0 * s)); }"),
-        ("s = -(s * x[1]);", "s = opposite_1((steered_1(s * x[1])));"),
-        ("v = -v * s - v;", "v = steered_3(steered_3(opposite_3(v) * s) - v);"),
+fn what_a_compiler_may_change_is_found_and_guarded() {
+    for (text, guarded_text) in [
+        ("s = s * x[1] + x[2];", "s = guarded_1(guarded_1(s * x[1]) + x[2]);"),
+        ("s += x[1] * (s - 1.0);", "s = guarded_1(s + (guarded_1( x[1] * (guarded_1(s - 1.0)))));"),
+        ("v -= v * s;", "v = guarded_3(v - (guarded_3( v * s)));"),
+        ("v = s * s * v;", "v = guarded_3(guarded_1(s * s) * v);"),
+        ("s = s * x[1] + 0.0;", "s = guarded_1(guarded_1(s * x[1]) + guarded_1(0.0));"),
+        ("v = vec3f(1.0, 0.0, s) - vec3f();", "v = guarded_3(vec3f(1.0, guarded_1(0.0), s) - guarded_3(vec3f()));"),
+        ("if s > 0.0 { s = 0.05 - 10.0 * s; }", "if s > 0.0 { s = guarded_1(0.05 - guarded_1(10.0 * s)); }"),
+        ("s = -(s * x[1]);", "s = opposite_1((guarded_1(s * x[1])));"),
+        ("v = -v * s - v;", "v = guarded_3(guarded_3(opposite_3(v) * s) - v);"),
         ("s = select(s, x[1], s > x[1]);", "s = chosen_1(s, x[1], s > x[1]);"),
-        ("s = select(s * 2.0, s, s * s > 1.0);", "s = chosen_1(steered_1(s * 2.0), s, steered_1(s * s) > 1.0);"),
+        ("s = select(s * 2.0, s, s * s > 1.0);", "s = chosen_1(guarded_1(s * 2.0), s, guarded_1(s * s) > 1.0);"),
     ] {
         let plain = program(text);
         assert!(!free(&plain).is_empty(), "{text}");
-        let changed = steered(&plain);
+        let changed = guarded(&plain);
         let squeezed = |text: &str| text.replace(' ', "");
-        assert!(squeezed(&changed).contains(&squeezed(steered_text)), "{text}: {changed}");
+        assert!(squeezed(&changed).contains(&squeezed(guarded_text)), "{text}: {changed}");
         assert_eq!(free(&changed), BTreeSet::new(), "{text}");
     }
     for (text, found) in [("s = sqrt(s);", "Sqrt"), ("s = max(s, x[1]);", "Max"), ("s = s / x[1];", "Divide")] {
-        let left = free(&steered(&program(text)));
+        let left = free(&guarded(&program(text)));
         assert!(left.iter().any(|free| free.starts_with(found)), "{text}: {left:?}");
     }
 }
@@ -142,7 +142,7 @@ fn what_a_compiler_may_change_is_found_and_steered() {
 #[test]
 fn the_number_that_steers_is_one_of_the_program() {
     for program in [Program::RESIDENT[1].clone(), every_program()[0].clone()] {
-        let text = steered(&program.source());
+        let text = guarded(&program.source());
         let of_begin = Program::RESIDENT.contains(&program);
         assert_eq!(text.contains("resident.zero"), of_begin, "{program:?}");
         assert_eq!(text.contains("params.zero"), !of_begin, "{program:?}");

@@ -1,4 +1,4 @@
-//! Inertia that joints lend to the bodies that they pull on. It keeps explicit steps stable. Derivation:
+//! Inertia from the geometric stiffness of joints under tension. It keeps explicit steps stable. Derivation:
 //! docs/derivation.md.
 
 use glam::{DMat3, Vec3};
@@ -7,18 +7,18 @@ use super::StepProblem;
 use super::effective::InverseMass;
 use super::rows::TurningRow;
 
-/// Inertia that one joint lends to a body.
-pub(super) type LentInertia = (u32, DMat3);
+/// Stiffness inertia of a body from one joint: the body, and the inertia.
+pub(super) type StiffnessInertia = (u32, DMat3);
 
-/// (h w)² above which a body is lent inertia, where w is the frequency at which it swings under the pull of its joints.
+/// (h w)² above which a body gets stiffness inertia, where w is the frequency at which it swings under the pull of its joints.
 /// Explicit steps are stable below 4. The value was measured on chains of 10 to 300 links with 1000 times the mass at
 /// the end, which go slack and snap, over 50 s. With 3 no chain gains energy and gaps stay below 25 mm. With 2 and
-/// less, energy grows by up to 0.1 of the swing, as the lent inertia comes and goes. With 4 gaps reach 2.5 m.
+/// less, energy grows by up to 0.1 of the swing, as the added inertia comes and goes. With 4 gaps reach 2.5 m.
 const SWING_LIMIT: f64 = 3.0;
 
 /// h² times the rotational stiffness of a body under a joint at the arm `r` that pulls with `impulse` in a substep of
 /// `h` seconds: r·F about axes perpendicular to the arm where r·F is positive, otherwise 0. F is `impulse` / h.
-fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
+fn stiffness_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     let (r, impulse) = (r.as_dvec3(), impulse.as_dvec3());
     let tension = r.dot(impulse);
     if tension.is_nan() || tension <= 0.0 {
@@ -28,25 +28,25 @@ fn lent_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     (DMat3::IDENTITY - along) * (tension * f64::from(h))
 }
 
-/// Lends inertia to the bodies of joints that are solved directly, and adds the rows that turn it with the bodies.
-/// `joints` has the joints that take part, each with the length of its substeps (s). `lent` is memory that steps reuse.
-pub(super) fn lend_inertia(
+/// Adds stiffness inertia to the bodies of joints that are solved directly, and adds the rows that turn it with the bodies.
+/// `joints` has the joints that take part, each with the length of its substeps (s). `added` is memory that steps reuse.
+pub(super) fn add_stiffness_inertia(
     joints: impl Iterator<Item = (usize, f32)>,
-    lent: &mut Vec<LentInertia>,
+    added: &mut Vec<StiffnessInertia>,
     problem: &mut StepProblem,
 ) {
     for (i, h) in joints {
         let (row, impulse) = (&problem.joints[i], problem.joint_impulse(&problem.joint_impulses, i));
         for (body, arm, sign) in [(row.body_a, row.r_a, -1.0), (row.body_b, row.r_b, 1.0)] {
-            lent.push((body, lent_inertia(Vec3::from_array(arm), impulse * sign, h)));
+            added.push((body, stiffness_inertia(Vec3::from_array(arm), impulse * sign, h)));
         }
     }
-    lent.sort_by_key(|(body, _)| *body);
-    for own in lent.chunk_by(|a, b| a.0 == b.0) {
+    added.sort_by_key(|(body, _)| *body);
+    for own in added.chunk_by(|a, b| a.0 == b.0) {
         let Some(row) = problem.masses.get_mut(own[0].0 as usize).filter(|row| row.inv_mass > 0.0) else {
             continue;
         };
-        let sum = own.iter().fold(DMat3::ZERO, |sum, lent| sum + lent.1);
+        let sum = own.iter().fold(DMat3::ZERO, |sum, part| sum + part.1);
         let inverse = InverseMass::of(row).inertia.as_dmat3();
         let product = sum * inverse;
         let swing = product.x_axis.x + product.y_axis.y + product.z_axis.z;
@@ -58,5 +58,5 @@ pub(super) fn lend_inertia(
         let (inv_inertia_x, inv_inertia_yz) = (row.inv_inertia_x, row.inv_inertia_yz);
         problem.turning.push(TurningRow { inv_inertia_x, body: own[0].0, inv_inertia_yz, pad: 0.0 });
     }
-    lent.clear();
+    added.clear();
 }
