@@ -10,9 +10,9 @@ use super::rows::TurningRow;
 /// Stiffness inertia of a body from one joint: the body, and the inertia.
 pub(super) type StiffnessInertia = (u32, DMat3);
 
-/// (h w)² above which a body gets stiffness inertia, where w is the frequency at which it swings under the pull of its joints.
-/// Explicit steps are stable below 4. The value was measured on chains of 10 to 300 links with 1000 times the mass at
-/// the end, which go slack and snap, over 50 s. With 3 no chain gains energy and gaps stay below 25 mm. With 2 and
+/// (h w)² above which a body gets stiffness inertia, where w is the frequency at which it swings under the pull of its
+/// joints. Explicit steps are stable below 4. The value was measured on chains of 10 to 300 links with 1000 times the
+/// mass at the end, which go slack and snap, over 50 s. With 3 no chain gains energy and gaps stay below 25 mm. With 2 and
 /// less, energy grows by up to 0.1 of the swing, as the added inertia comes and goes. With 4 gaps reach 2.5 m.
 const SWING_LIMIT: f64 = 3.0;
 
@@ -28,8 +28,9 @@ fn stiffness_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     (DMat3::IDENTITY - along) * (tension * f64::from(h))
 }
 
-/// Adds stiffness inertia to the bodies of joints that are solved directly, and adds the rows that turn it with the bodies.
-/// `joints` has the joints that take part, each with the length of its substeps (s). `added` is memory that steps reuse.
+/// Adds stiffness inertia to the bodies of joints that are solved directly, and the rows that turn it with the bodies.
+/// `joints` has the joints that take part, each with the length of its substeps (s). `added` is memory that steps
+/// reuse.
 pub(super) fn add_stiffness_inertia(
     joints: impl Iterator<Item = (usize, f32)>,
     added: &mut Vec<StiffnessInertia>,

@@ -36,8 +36,15 @@ pub struct Test(Trial, Option<String>);
 
 impl Test {
     fn if_problems_are_given(self) -> Self {
-        let missing = || std::env::var_os("DRYSTONE_PROBLEMS").is_none().then(|| "DRYSTONE_PROBLEMS is not set".into());
-        let why = self.1.or_else(missing);
+        self.only_if(std::env::var_os("DRYSTONE_PROBLEMS").is_some(), "DRYSTONE_PROBLEMS is not set")
+    }
+
+    fn at_night(self) -> Self {
+        self.only_if(is_full(), "DRYSTONE_FULL is not 1")
+    }
+
+    fn only_if(self, runs: bool, otherwise: &str) -> Self {
+        let why = self.1.or_else(|| (!runs).then(|| otherwise.into()));
         Self(self.0.with_ignored_flag(why.is_some()), why)
     }
 }
@@ -109,13 +116,10 @@ pub fn every_backend(module: &str, name: &str, run: fn(Open)) -> Vec<Test> {
     vec![on("cpu", &[], || Box::new(Cpu::new())), on("gpu", &[Need::Adapter], || Box::new(gpu::plain()))]
 }
 
-/// The same; the one on the GPU, which takes seconds, runs at night. Every rule of the kernels has its test on the GPU by day.
+/// The same, and by day the one on the GPU, which takes seconds, is left out: other tests compare every rule of the kernels by day.
 pub fn every_backend_the_gpu_at_night(module: &str, name: &str, run: fn(Open)) -> Vec<Test> {
-    let mut tests = every_backend(module, name, run);
-    if !is_full() {
-        tests.truncate(1);
-    }
-    tests
+    let [cpu, gpu] = <[Test; 2]>::try_from(every_backend(module, name, run)).ok().expect("two backends");
+    vec![cpu, gpu.at_night()]
 }
 
 /// The same, and a third on the reference.

@@ -122,7 +122,7 @@ fn scenes_that_make_no_energy_lose_none_to_the_law() {
             most = most.max(simulation.world.kinetic_energy());
         }
         println!("{name}: {taken:.3e} J of {most:.3e} J, {refused} steps");
-        // Hits at hundreds of meters a second make some energy, and so do loops of joints and limbs that fall on stairs.
+        // Hits at hundreds of meters a second make some energy. So do loops of joints, and limbs that fall on stairs.
         let share = match name {
             "bullets" => 0.05,
             "four-bar" | "ragdoll" | "ragdolls" => 0.02,

@@ -194,7 +194,7 @@ fn answers_are_those_of_all_colliders_one_by_one_in_worlds_that_change() {
             for _ in 0..[0, 1, 10][round % 3] {
                 simulation.step(DT).expect("a step");
             }
-            // Colliders that are not in the tree.
+            // The tree has not seen these changes.
             let handles: Vec<_> = simulation.world.bodies.handles().collect();
             for _ in 0..if round % 4 == 1 { 20 } else { 2 } {
                 let chosen = handles[random.below(handles.len() as u32) as usize];

@@ -264,7 +264,7 @@ fn sweeps_end_where_no_correction_is_above_the_tolerance() {
             let (ours, theirs) = (by_the_reference(&problem, &passes), after(&mut gpu, &problem, &passes));
             assert_eq!(ours.convergence, theirs.convergence, "{kernel}");
             assert_eq!((ours.convergence.sweeps, ours.convergence.planned), (sweeps, 3), "{kernel}");
-            // A kernel that did not run changed nothing.
+            // Sweeps that did not run changed nothing.
             let done = by_the_reference(&problem, &passes[..2 * sweeps as usize]);
             assert_eq!(
                 (&ours.bodies, &ours.impulses, &ours.joint_impulses),

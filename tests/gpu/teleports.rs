@@ -112,7 +112,7 @@ fn a_box_that_is_turned_over_under_a_pile_begins_without_impulses() {
     assert!(highest < 2e-5, "{highest} m");
 }
 
-/// The bodies that it left are as they would be without it.
+/// The contacts that a box left do not act on it.
 fn a_box_from_one_tower_lies_still_on_another() {
     let mut simulation = awake(&[9, 3]);
     let top = simulation.world.bodies[12].position;

@@ -13,7 +13,7 @@ use drystone_view::Picture;
 pub struct Output {
     path: PathBuf,
     /// Dropped before the draft, so that the writer ends first.
-    kind: Format,
+    format: Format,
     draft: Draft,
     size: (u32, u32),
     /// Duration of a GIF frame (1/100 s).
@@ -50,7 +50,7 @@ impl Output {
     pub fn open(path: &Path, size: (u32, u32), rate: f64) -> Result<Self> {
         Self::check(path)?;
         let draft = Draft::of(path)?;
-        let kind = match path.extension().and_then(|e| e.to_str()) {
+        let format = match path.extension().and_then(|e| e.to_str()) {
             _ if is_folder(path) => {
                 std::fs::create_dir(draft.place()).map_err(Error::file(path))?;
                 Format::Frames(0)
@@ -72,12 +72,12 @@ impl Output {
             _ => return Err(unknown(path)),
         };
         let delay = (100.0 / rate).round().clamp(2.0, 1000.0) as u16;
-        Ok(Self { path: path.into(), draft, kind, size, delay })
+        Ok(Self { path: path.into(), draft, format, size, delay })
     }
 
     pub fn add(&mut self, picture: &Picture) -> Result<()> {
         let path = &self.path;
-        match &mut self.kind {
+        match &mut self.format {
             Format::Png(file) => write_png(file, picture).map_err(|e| failed(path, e)),
             Format::Frames(count) => {
                 let folder = self.draft.place();
@@ -100,8 +100,8 @@ impl Output {
     }
 
     pub fn finish(self) -> Result<()> {
-        let Self { path, draft, kind, .. } = self;
-        match kind {
+        let Self { path, draft, format, .. } = self;
+        match format {
             Format::Gif(encoder) => {
                 let mut file = encoder.into_inner().map_err(|e| failed(&path, e))?;
                 file.flush().map_err(Error::file(&path))?;

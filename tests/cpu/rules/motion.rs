@@ -29,7 +29,7 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
             c.joint_solver = JointSolver::Sweeps;
             c.joint_frequency = frequency;
             c.joint_damping = damping;
-            // A body that begins away from its joint gets at most this energy.
+            // The limit bounds the energy of a body that begins away from its joint.
             c.push_limit = 100.0;
         });
         let mut simulation = simulation(world, config);
