@@ -60,28 +60,31 @@ pub struct Rules {
 }
 
 impl Default for Rules {
-    /// Relax sweeps of flat, frictionless contacts.
+    /// [`Rules::PLAIN`].
     fn default() -> Self {
-        Self {
-            biased: false,
-            friction: FrictionRule::None,
-            patch: false,
-            friction_first: false,
-            accumulated: true,
-            round: false,
-            as_one: false,
-            driven: false,
-            passes: 1,
-            measured: false,
-            from_start: false,
-            isotropic: false,
-            bounces: false,
-            axes: false,
-        }
+        Self::PLAIN
     }
 }
 
 impl Rules {
+    /// Relax sweeps of flat, frictionless contacts.
+    pub const PLAIN: Self = Self {
+        biased: false,
+        friction: FrictionRule::None,
+        patch: false,
+        friction_first: false,
+        accumulated: true,
+        round: false,
+        as_one: false,
+        driven: false,
+        passes: 1,
+        measured: false,
+        from_start: false,
+        isotropic: false,
+        bounces: false,
+        axes: false,
+    };
+
     /// The rules of a warm start, which needs only those of friction and inertia.
     pub fn of_warm_start(self) -> Self {
         Self { friction: self.friction, patch: self.patch, isotropic: self.isotropic, ..Self::default() }

@@ -10,11 +10,20 @@ use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_group::{BodyLanes, LaneGroup};
 use super::lane_rows::{GroupRows, OwnImpulses, SharedImpulses, SharedPoints};
+use crate::config::FrictionRule;
 use crate::kernels::contact::sum_impulse;
-use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, StepParams};
+use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Rules, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
+
+/// The kernels of most sweeps: over flat contacts without restitution, in the default settings.
+const BIASED: Kernel = Kernel::SolveContacts(Rules { biased: true, ..Rules::PLAIN });
+const RELAX: Kernel = Kernel::SolveContacts(Rules { friction: FrictionRule::Disc, ..Rules::PLAIN });
+/// The same, where every movable body has equal moments of inertia.
+const BIASED_CUBES: Kernel = Kernel::SolveContacts(Rules { biased: true, isotropic: true, ..Rules::PLAIN });
+const RELAX_CUBES: Kernel =
+    Kernel::SolveContacts(Rules { friction: FrictionRule::Disc, isotropic: true, ..Rules::PLAIN });
 
 /// A pass over the groups of one color. `AS_ONE` is for kernels that treat the points of a manifold as one: their code
 /// would take registers from the other sweeps.
@@ -35,22 +44,34 @@ pub(super) struct Sweep<'a, C, const AS_ONE: bool> {
 impl<C: Constraint, const AS_ONE: bool> Work for Sweep<'_, C, AS_ONE> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
-        let params = StepParams::<L>::load(self.params, self.substep);
-        for group in groups {
-            self.sweep::<L>(&params, &self.groups[group]);
+        // Each kernel of most sweeps is compiled for its rules: numbers that these rules do not use take no registers.
+        match self.kernel {
+            BIASED if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(BIASED, groups),
+            RELAX if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(RELAX, groups),
+            BIASED_CUBES if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(BIASED_CUBES, groups),
+            RELAX_CUBES if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(RELAX_CUBES, groups),
+            kernel => self.sweep_all::<L>(kernel, groups),
         }
     }
 }
 
 impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
     #[inline(always)]
-    fn sweep<L: Lanes>(&self, params: &StepParams<L>, group: &LaneGroup) {
+    fn sweep_all<L: Lanes>(&self, kernel: Kernel, groups: Range<usize>) {
+        let params = StepParams::<L>::load(self.params, self.substep);
+        for group in groups {
+            self.sweep(kernel, &params, &self.groups[group]);
+        }
+    }
+
+    #[inline(always)]
+    fn sweep<L: Lanes>(&self, kernel: Kernel, params: &StepParams<L>, group: &LaneGroup) {
         let states = self.bodies.as_ptr();
         // SAFETY: `Load::take_bodies` looked up the slot of every lane. `CheckedStep` guarantees that a movable body
         // occurs once in a color, so no other task of this color reads or writes it. No task writes a body that cannot
         // move.
         let mut pair = unsafe { wide_pair::<L>(states, &group.a, &group.b) };
-        if self.kernel.is_from_start() {
+        if kernel.is_from_start() {
             let free = self.free.as_ptr();
             // SAFETY: as above, and each state has a row of `free`, which no sweep writes.
             unsafe {
@@ -66,13 +87,13 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
         if C::HAS_POINTS {
             // SAFETY: `Contact` is `repr(C)` and holds lanes only.
             let contact: &Contact<L> = unsafe { as_lanes(&group.header) };
-            sweep_contact(self.kernel, AS_ONE, params, &mut pair, contact, &mut rows);
+            sweep_contact(kernel, AS_ONE, params, &mut pair, contact, &mut rows);
         } else {
             let [joint @ .., _]: &[Wide; 11] = &group.header;
             // SAFETY: `Joint` is `repr(C)` and holds lanes only.
             let joint: &Joint<L> = unsafe { as_lanes::<_, 10>(joint) };
             let mut impulse = rows.impulses.components(0);
-            sweep_joint(self.kernel, params, &mut pair, joint, &mut impulse, &mut rows);
+            sweep_joint(kernel, params, &mut pair, joint, &mut impulse, &mut rows);
             rows.impulses.set_components(0, impulse);
         }
         // SAFETY: as above.
@@ -80,7 +101,7 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
             store_velocities(states, &group.a, &pair.a);
             store_velocities(states, &group.b, &pair.b);
         }
-        if self.kernel.is_measured() && pair.moving.store().0.iter().any(|&m| m > 0.0) {
+        if kernel.is_measured() && pair.moving.store().0.iter().any(|&m| m > 0.0) {
             self.moving.store(true, Ordering::Relaxed);
         }
     }
