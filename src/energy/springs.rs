@@ -131,7 +131,7 @@ pub(super) fn add_work_of_drives(
 
 /// Energy of a spring of the caller at a deflection, if its axis moves this mass, with the limit on its force (J).
 fn held_by_drive(axis: &Axis<f64>, deflection: f64, mass: f64, substep: f64) -> f64 {
-    let (stiffness, most) = (mass * axis.rate / substep, axis.max_impulse / substep);
+    let (stiffness, most) = (mass * axis.rate / (axis.impulse_scale * substep), axis.max_impulse / substep);
     let reach = deflection.abs().min(most / stiffness);
     stiffness * reach * (deflection.abs() - 0.5 * reach)
 }

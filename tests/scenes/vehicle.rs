@@ -1,6 +1,7 @@
 //! The vehicle of the catalogue against closed forms, and a character on the course.
 
 use drystone::glam::Vec3;
+use drystone::preset::Preset;
 use drystone::{Body, Character, Reference, Simulation, SolverConfig};
 use drystone_scenes::Scene;
 
@@ -13,10 +14,14 @@ const RADIUS: f32 = 0.35;
 const WHEELBASE: f32 = 2.6;
 
 fn vehicle(parameters: &[&str]) -> Simulation {
+    vehicle_with(SolverConfig::default(), parameters)
+}
+
+fn vehicle_with(config: SolverConfig, parameters: &[&str]) -> Simulation {
     let parameters: Vec<String> = parameters.iter().map(|&p| p.to_owned()).collect();
     let scene = Scene::find("vehicle", &parameters).expect("the scene");
     let reference = Box::new(Reference::<f32>::new());
-    Simulation::with(scene.world, SolverConfig::default().without_sleep(), reference).expect("a simulation")
+    Simulation::with(scene.world, config.without_sleep(), reference).expect("a simulation")
 }
 
 fn steps(simulation: &mut Simulation, count: u32) {
@@ -27,7 +32,7 @@ fn chassis(simulation: &Simulation) -> &Body {
     simulation.world.bodies.iter().find(|body| body.name == "chassis").expect("a chassis")
 }
 
-/// The closed form is mg/k. After some seconds at rest, the springs yield 9 % less.
+/// The closed form is mg/k.
 #[test]
 fn it_stands_as_high_as_its_springs_say() {
     // At 1.5 Hz the springs yield by g/omega² under the chassis alone, and it then is 0.75 m high.
@@ -38,7 +43,8 @@ fn it_stands_as_high_as_its_springs_say() {
         steps(&mut simulation, 480);
         let Body { position, linear_velocity, .. } = chassis(&simulation);
         let (yielded, expected) = (0.75 + sag - position.y, sag * (1.0 + load / CHASSIS));
-        assert!((yielded / expected - 1.0).abs() < 0.1, "{load} kg: {yielded} m, not {expected}");
+        println!("{load} kg: {yielded} m of {expected}, {linear_velocity} m/s");
+        assert!((yielded / expected - 1.0).abs() < 1e-3, "{load} kg: {yielded} m, not {expected}");
         assert!(linear_velocity.length() < 1e-3 && position.x.abs() < 2e-3, "{load} kg: {position} {linear_velocity}");
     }
 }
@@ -85,11 +91,13 @@ fn it_drives_the_circle_of_its_steering() {
 }
 
 /// It slides sideways at mu g. The wheels are 0.9 m from the middle, and the center of mass is 0.71 m high: it turns over
-/// from 1.26 g on, or from less on its springs.
+/// from 1.26 g on, or from less on its springs. A wheel has a fortieth of the mass of the chassis: with the 8 substeps of
+/// the default its contact follows the load of a fast roll too late, and the vehicle slides on all wheels.
 #[test]
 fn it_turns_over_only_beyond_the_limit_of_its_track() {
     let least_upright = |mu: f32| {
-        let mut simulation = vehicle(&["speed=0", "steering=0", "hills=0", &format!("mu={mu}")]);
+        let mut simulation =
+            vehicle_with(Preset::Accurate.config(), &["speed=0", "steering=0", "hills=0", &format!("mu={mu}")]);
         steps(&mut simulation, 120);
         let moving = simulation.world.bodies.iter_mut().filter(|body| body.mass.mass > 0.0);
         moving.for_each(|body| body.linear_velocity += 8.0 * Vec3::Z);
@@ -100,9 +108,9 @@ fn it_turns_over_only_beyond_the_limit_of_its_track() {
         }
         least
     };
-    let (low, high) = (least_upright(0.7), least_upright(2.5));
-    println!("up at least {low} at a friction of 0.7, and {high} at 2.5");
-    assert!(low > 0.97 && high < 0.5, "{low}, {high}");
+    let (low, high) = (least_upright(1.0), least_upright(2.0));
+    println!("up at least {low} at a friction of 1.0, and {high} at 2.0");
+    assert!(low > 0.99 && high < 0.5, "{low}, {high}");
 }
 
 #[test]
