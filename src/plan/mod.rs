@@ -308,7 +308,7 @@ impl StepPlan {
         plan
     }
 
-    /// Sweeps in the order of the course sheet: joints, then contacts.
+    /// Sweeps in the order of the course sheet: joints, then contacts. Joint systems come last.
     ///
     /// Joints have separate colors. Colored together with the contacts they need as many (bridge: 6 + 2 separately, 8
     /// together; chain 3 + 0 and 3), and one kernel would have to process both.
@@ -328,21 +328,21 @@ impl StepPlan {
             if accelerated {
                 self.over_all(Kernel::Extrapolate { first, measured }, block);
             }
-            if let [first, ..] = sweeps.direct {
-                let rules = Rules { axes: true, ..rules.of_joints() };
-                let all = first.start..sweeps.direct[sweeps.direct.len() - 1].end;
-                // Locks have the last word.
-                self.over_colors(Kernel::SolveAxes(rules), block, sweeps.swept_axes);
-                self.over_colors(Kernel::MeasureJoints(rules), block, &[all]);
-                self.over_colors(Kernel::SolveJointSystems(rules), block, sweeps.systems);
-                self.over_colors(Kernel::ApplyJointChanges(rules), block, sweeps.direct);
-            }
+            let of_systems = Rules { axes: true, ..rules.of_joints() };
+            self.over_colors(Kernel::SolveAxes(of_systems), block, sweeps.swept_axes);
             self.over_colors(Kernel::SolveJoints(rules.of_joints()), block, sweeps.joints);
             let rules = Rules { axes: false, ..rules };
             self.over_colors(Kernel::SolveContacts(rules), block, sweeps.contacts);
             self.over_colors(Kernel::SolveContacts(Rules { as_one: true, ..rules }), block, sweeps.struck);
             let jammed = Rules { passes: rules.passes.max(JAMMED_PASSES), ..rules };
             self.over_colors(Kernel::SolveContacts(jammed), block, sweeps.jamming);
+            // A sweep leaves its rows with small errors, a system is solved exactly. If a contact came after it, a light
+            // body that hits something would open its joints.
+            if let (Some(first), Some(last)) = (sweeps.direct.first(), sweeps.direct.last()) {
+                self.over_colors(Kernel::MeasureJoints(of_systems), block, &[first.start..last.end]);
+                self.over_colors(Kernel::SolveJointSystems(of_systems), block, sweeps.systems);
+                self.over_colors(Kernel::ApplyJointChanges(of_systems), block, sweeps.direct);
+            }
             if accelerated && (sweeps.go_on || sweep + 1 < sweeps.range.end) {
                 self.over_all(Kernel::MeasureStep, block);
                 self.over_all(Kernel::UpdateMomentum, block);

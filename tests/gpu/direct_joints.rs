@@ -411,10 +411,10 @@ fn a_ball_of_next_to_no_inertia_at_a_long_arm_stays_where_it_is_tied() {
     assert!(gaps[4] < 0.02, "{gaps:?} m");
 }
 
-/// One fall tells little: before the law of energy, the links were faster than 5 mm/s after two of these five falls with the direct solution, and
-/// the mean kinetic energy was 0.28 J; it is 0.08 J now.
+/// The links lie, and the ball at their end rolls on, with nothing to stop it: at up to 0.12 m/s, also with 64 substeps. It
+/// drags links along. One fall tells little.
 fn a_chain_that_falls_on_the_ground_lies_there() {
-    for (solver, most) in [(JointSolver::Direct, 0.15), (JointSolver::Sweeps, 0.3)] {
+    for solver in [JointSolver::Direct, JointSolver::Sweeps] {
         let mut kinetic = 0.0;
         for height in [0.6, 0.61, 0.62, 0.65, 0.7] {
             let mut world = chain(30, 100.0);
@@ -423,13 +423,17 @@ fn a_chain_that_falls_on_the_ground_lies_there() {
             let mut simulation = simulation(world, solver);
             let gap = largest_gap(&mut simulation, 900);
             let overlap = simulation.penetration().max;
-            println!("{solver}, {height} m: gap {gap} m, overlap {overlap} m, {} J", simulation.world.kinetic_energy());
-            assert!(simulation.world.bodies[15].position.y < 0.2 - height, "it did not fall");
-            assert!(gap < 5e-3 && overlap < 5e-3, "gap {gap} m, overlap {overlap} m");
-            kinetic += simulation.world.kinetic_energy() / 5.0;
+            let bodies = &simulation.world.bodies;
+            let of_links: f32 =
+                bodies[..30].iter().map(|b| 0.5 * b.mass.mass * b.linear_velocity.length_squared()).sum();
+            let ball = bodies[30].linear_velocity.length();
+            println!("{solver}, {height} m: gap {gap} m, overlap {overlap} m, links {of_links} J, ball {ball} m/s");
+            assert!(bodies[15].position.y < 0.2 - height, "it did not fall");
+            assert!(gap < if solver == JointSolver::Direct { 3e-4 } else { 5e-3 }, "{solver}: gap {gap} m");
+            assert!(overlap < 5e-3 && ball < 0.2, "overlap {overlap} m, {ball} m/s");
+            kinetic += of_links / 5.0;
         }
-        // The ball rolls on, with either.
-        assert!(kinetic < most, "{solver}: {kinetic} J");
+        assert!(kinetic < 5e-3, "{solver}: {kinetic} J");
     }
 }
 
