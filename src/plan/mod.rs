@@ -339,7 +339,8 @@ impl StepPlan {
             // A sweep leaves its rows with small errors, a system is solved exactly. If a contact came after it, a light
             // body that hits something would open its joints.
             if let (Some(first), Some(last)) = (sweeps.direct.first(), sweeps.direct.last()) {
-                self.over_colors(Kernel::MeasureJoints(of_systems), block, &[first.start..last.end]);
+                let all = first.start..last.end;
+                self.over_colors(Kernel::MeasureJoints(of_systems), block, &[all]);
                 self.over_colors(Kernel::SolveJointSystems(of_systems), block, sweeps.systems);
                 self.over_colors(Kernel::ApplyJointChanges(of_systems), block, sweeps.direct);
             }
