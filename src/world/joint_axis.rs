@@ -66,7 +66,8 @@ pub enum Drive {
         /// The largest force or torque (N, N m).
         max_load: f32,
     },
-    /// A spring and damper.
+    /// A spring and damper. It yields to a constant load exactly as far as its stiffness says. With substeps of h seconds,
+    /// its period is too long by the share pi h times frequency and damping ratio.
     Spring {
         /// The rest position (m, rad).
         target: f32,
@@ -79,7 +80,8 @@ pub enum Drive {
         /// The largest total force or torque of spring and damper (N, N m).
         max_load: f32,
     },
-    /// A spring and damper with constants of their own, independent of the mass that they move.
+    /// A spring and damper with constants of their own, independent of the mass that they move; as exact as
+    /// [`Self::Spring`].
     SpringDamper {
         /// The rest position (m, rad).
         target: f32,
