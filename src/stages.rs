@@ -41,7 +41,7 @@ pub mod math {
 
 /// The invariants that backends rely on.
 pub mod backend {
-    pub use crate::backend::calibrate::crossover;
+    pub use crate::backend::calibrate::step_times;
     pub use crate::backend::checked::CheckedStep;
     #[cfg(feature = "gpu")]
     pub use crate::backend::gpu::blocking::block_on;
@@ -56,7 +56,7 @@ pub mod backend {
         pub use crate::backend::gpu::rows::{JOINT_BLOCK, JOINT_NODE, SCRATCH_ROW};
         #[cfg(not(target_family = "wasm"))]
         pub use crate::backend::gpu::spirv_exact::exact_spirv;
-        pub use crate::backend::gpu::wgsl::{ENTRY_POINT, Program, WORKGROUP};
+        pub use crate::backend::gpu::wgsl::{ENTRY_POINT, Program, Target};
         pub use crate::backend::gpu::wgsl_exact::exact_wgsl;
     }
 }

@@ -1,9 +1,7 @@
-//! Measures the scene size from which a GPU is faster, with small piles that are the same on every machine.
+//! Measures whether a GPU is faster for a scene, with a pile that is the same on every machine.
 //!
-//! For each backend, a step has a fixed cost (dispatches and transfers, or waking threads) and a cost for each body.
-//! Two piles give both numbers; on a GPU the time of the smaller one is almost only fixed cost. Each pile has the
-//! contacts, colors and substeps of a settled pile of boxes with the default plan. As in a run, the GPU keeps rows of
-//! an earlier step.
+//! The pile has about as many bodies as the scene, and the contacts, colors and substeps of a settled pile of boxes with
+//! the default plan. As in a run, the GPU keeps rows of an earlier step.
 
 use super::{Backend, CheckedStep};
 use crate::config::SolverConfig;
@@ -14,33 +12,34 @@ use crate::problem::{BodyRow, ContactRow, ImpulseRow, MassRow, Params, PointRow,
 use crate::stats::Stopwatch;
 use glam::Vec3;
 
-/// Bodies along each side of the two piles.
-const SIDES: [u32; 2] = [6, 20];
+/// Fewest and most bodies along each side of the pile. The largest pile runs for about a second.
+const SIDES: [u32; 2] = [6, 40];
 /// Number of steps. The fastest one counts.
 const STEPS: u32 = 5;
 
-/// The number of bodies from which a step takes less time on `gpu` than on `cpu`, or `None` if it never does.
+/// The times of a step on two backends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepTimes {
+    /// Number of bodies of the pile.
+    pub bodies: usize,
+    /// Time of a step on the CPU (s).
+    pub cpu: f64,
+    /// Time of a step on the GPU (s).
+    pub gpu: f64,
+}
+
+/// Measures a step of a pile of about `bodies` bodies, at most 64,000, on two backends.
 ///
 /// # Errors
 /// A backend cannot run.
-pub fn crossover(cpu: &mut dyn Backend, gpu: &mut dyn Backend) -> Result<Option<usize>> {
-    let piles = SIDES.map(pile);
-    let times = |backend: &mut dyn Backend| Ok([seconds(backend, &piles[0])?, seconds(backend, &piles[1])?]);
-    let (cpu, gpu) = (times(cpu)?, times(gpu)?);
-    Ok(crossing(piles.map(|pile| pile.bodies.len()), cpu, gpu))
+pub fn step_times(cpu: &mut dyn Backend, gpu: &mut dyn Backend, bodies: usize) -> Result<StepTimes> {
+    let pile = pile(side(bodies));
+    Ok(StepTimes { bodies: pile.bodies.len(), cpu: seconds(cpu, &pile)?, gpu: seconds(gpu, &pile)? })
 }
 
-/// The number of bodies from which the line through the times of `gpu` is below that of `cpu`, or `None` if it never
-/// is. The times were measured with two numbers of `bodies`, few and many. No line falls, and none starts below zero.
-fn crossing(bodies: [usize; 2], cpu: [f64; 2], gpu: [f64; 2]) -> Option<usize> {
-    let [few, many] = bodies.map(|n| n as f64);
-    let line = |[small, large]: [f64; 2]| {
-        let a_body = ((large - small) / (many - few)).max(0.0);
-        ((small - a_body * few).max(0.0), a_body)
-    };
-    let ((fixed_cpu, body_cpu), (fixed_gpu, body_gpu)) = (line(cpu), line(gpu));
-    let (dearer, cheaper) = (fixed_gpu - fixed_cpu, body_cpu - body_gpu);
-    (cheaper > 0.0).then(|| (dearer / cheaper).max(0.0).ceil() as usize)
+/// Number of bodies along each side of a pile of about `bodies` bodies.
+fn side(bodies: usize) -> u32 {
+    ((bodies as f64).cbrt().round() as u32).clamp(SIDES[0], SIDES[1])
 }
 
 /// Time of a step of a pile, after a first run (s).
@@ -115,40 +114,19 @@ mod tests {
     use crate::backend::cpu::{Cpu, Reference};
     use std::time::Duration;
 
-    /// Times of a line with the fixed cost `fixed` and the cost `a_body` for each body, at 200 and 8,000 bodies.
-    fn times(fixed: f64, a_body: f64) -> [f64; 2] {
-        BODIES.map(|n| fixed + a_body * n as f64)
-    }
-
-    const BODIES: [usize; 2] = [200, 8_000];
-
     #[test]
-    fn a_gpu_pays_from_where_the_lines_cross() {
-        // Powers of two make every sum exact: 2 + n / 1024 and 5 + n / 4096 are equal at 4096.
-        let (cpu, gpu) = (times(2.0, 1.0 / 1024.0), times(5.0, 1.0 / 4096.0));
-        let found = crossing(BODIES, cpu, gpu).expect("they cross");
-        assert!((4096..=4097).contains(&found), "{found}");
-        assert!(cpu[0] < gpu[0] && cpu[1] > gpu[1]);
-        // With the roles swapped, the GPU is faster only for few bodies, and there is no crossover.
-        assert_eq!(crossing(BODIES, gpu, cpu), None);
+    fn the_pile_has_about_the_bodies_of_the_scene() {
+        for (bodies, of_pile) in [(0, 216), (500, 512), (1_000, 1_000), (20_000, 19_683), (1_000_000, 64_000)] {
+            assert_eq!(side(bodies).pow(3), of_pile, "{bodies}");
+        }
     }
 
     #[test]
-    fn a_gpu_that_is_always_cheaper_pays_at_once_and_one_that_is_always_dearer_never() {
-        let (cheap, dear) = (times(1.0, 0.125), times(8.0, 0.5));
-        assert_eq!(crossing(BODIES, dear, cheap), Some(0));
-        assert_eq!(crossing(BODIES, cheap, dear), None);
-        assert_eq!(crossing(BODIES, cheap, cheap), None);
-    }
-
-    #[test]
-    fn a_large_pile_that_was_measured_as_faster_than_a_small_one_counts_as_free() {
-        let (falling, rising) = ([4.0, 3.0], times(1.0, 0.25));
-        assert_eq!(crossing(BODIES, falling, rising), None);
-        // A step costs the GPU a constant 4, and the processor 1 + n / 4.
-        assert_eq!(crossing(BODIES, rising, falling), Some(12));
-        // The cost per body is at least the whole time of the small pile: no fixed cost remains.
-        assert_eq!(crossing(BODIES, [0.0, 78.0], [0.0, 39.0]), Some(0));
+    fn each_backend_has_its_own_time() {
+        let (mut cpu, mut gpu) = (Reference::<f32>::new(), Sleeper::default());
+        let times = step_times(&mut cpu, &mut gpu, 216).expect("both run");
+        assert_eq!((times.bodies, gpu.0.len()), (216, STEPS as usize + 1));
+        assert!(times.gpu >= SLEEP.as_secs_f64() && times.cpu > 0.0 && times.cpu.is_finite(), "{times:?}");
     }
 
     /// Keeps rows, sleeps in every step except the first, and records the steps that continue from its rows.

@@ -19,8 +19,8 @@ use crate::names::named;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BackendChoice {
-    /// A hardware GPU, if there is one and it is faster for the size of the scene; else the CPU. A few steps of a small
-    /// pile on both show which is faster.
+    /// A hardware GPU, if there is one and it is faster for the size of the scene; else the CPU. A few steps of a pile of
+    /// that size on both show which is faster.
     #[default]
     Auto,
     /// The compute shaders, on the best available adapter.
@@ -121,13 +121,15 @@ fn fastest(dynamic_bodies: usize, exact: bool) -> Result<(Option<Box<dyn Backend
         return Ok((None, "no hardware GPU found; `drystone adapters` lists all adapters".into()));
     };
     let adapter = gpu.adapter();
-    let crossover = super::calibrate::crossover(&mut Cpu::new(), &mut gpu)?;
-    let pays = crossover.map_or("never faster".into(), |n| format!("faster from about {n} bodies on"));
-    Ok(if crossover.is_some_and(|n| dynamic_bodies >= n) {
-        (Some(Box::new(gpu)), format!("{dynamic_bodies} dynamic bodies; measured: the GPU is {pays}; {adapter}"))
-    } else {
-        (None, format!("{dynamic_bodies} dynamic bodies; measured: the GPU is {pays}; {adapter}"))
-    })
+    let times = super::calibrate::step_times(&mut Cpu::new(), &mut gpu, dynamic_bodies)?;
+    let why = format!(
+        "{dynamic_bodies} dynamic bodies; a step of a pile of {} takes {:.2} ms on the CPU and {:.2} ms on the GPU; {adapter}",
+        times.bodies,
+        times.cpu * 1e3,
+        times.gpu * 1e3
+    );
+    let faster = (times.gpu < times.cpu).then(|| Box::new(gpu) as Box<dyn Backend>);
+    Ok((faster, why))
 }
 
 #[cfg(not(feature = "gpu"))]

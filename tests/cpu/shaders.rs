@@ -9,13 +9,13 @@ use std::path::Path;
 
 use crate::common::kernels::{every_kernel, every_rules};
 use drystone::config::FrictionRule;
-use drystone::stages::backend::shader::{Binding, ENTRY_POINT, Program, Reflected, WORKGROUP};
+use drystone::stages::backend::shader::{Binding, ENTRY_POINT, Program, Reflected, Target};
 use drystone::stages::kernels::Rules;
 use drystone::stages::plan::Kernel;
 
 /// A program as naga reads it: validated without any capability.
-fn reflected(program: &Program) -> Reflected {
-    Reflected::new(program.name(), &program.source()).unwrap_or_else(|e| panic!("{program:?}: {e}"))
+fn reflected(program: &Program, target: Target) -> Reflected {
+    Reflected::new(program.name(), &program.source(target)).unwrap_or_else(|e| panic!("{program:?}, {target:?}: {e}"))
 }
 
 fn parsed(source: &str) -> naga::Module {
@@ -41,6 +41,16 @@ fn every_program() -> Vec<Program> {
     every_kernel().into_iter().map(Program::Pass).chain(fused).chain(Program::RESIDENT).collect()
 }
 
+/// Every program with the kinds of adapters that get a text of their own.
+fn every_text() -> Vec<(Program, Target)> {
+    let differs = |program: &Program| matches!(program, Program::Pass(Kernel::SolveContacts(_)));
+    let of = |program: Program| {
+        let hardware = differs(&program).then(|| (program.clone(), Target::Hardware));
+        [(program, Target::Software)].into_iter().chain(hardware)
+    };
+    every_program().into_iter().flat_map(of).collect()
+}
+
 /// Number of storage buffers of a program.
 fn storage_buffers(reflected: &Reflected) -> usize {
     let is_storage = |&&at: &&Binding| matches!(reflected.space(at), naga::AddressSpace::Storage { .. });
@@ -61,26 +71,29 @@ fn every_shader_file_is_a_program_and_every_program_has_a_file() {
     let kernels: Vec<_> = every_kernel().into_iter().map(Program::Pass).collect();
     assert_eq!(files("shaders"), names(&kernels));
     assert_eq!(files("shaders/resident"), names(&Program::RESIDENT));
-    for program in every_program() {
-        let entry_points: Vec<_> = reflected(&program).module.entry_points.into_iter().map(|e| e.name).collect();
+    for (program, target) in every_text() {
+        let reflected = reflected(&program, target);
+        let entry_points: Vec<_> = reflected.module.entry_points.into_iter().map(|e| e.name).collect();
         assert_eq!(entry_points, [ENTRY_POINT], "{program:?}");
     }
 }
 
 #[test]
 fn every_program_stays_inside_what_every_webgpu_offers() {
-    for program in every_program() {
-        let reflected = reflected(&program);
+    for (program, target) in every_text() {
+        let reflected = reflected(&program, target);
         let storage = storage_buffers(&reflected);
         assert!((1..=8).contains(&storage), "{program:?} has {storage} storage buffers");
-        assert_eq!(reflected.module.entry_points[0].workgroup_size, [WORKGROUP, 1, 1], "{program:?}");
+        let threads = program.threads(target);
+        assert!([32, 64].contains(&threads), "{program:?}: {threads}");
+        assert_eq!(reflected.module.entry_points[0].workgroup_size, [threads, 1, 1], "{program:?}");
     }
 }
 
 /// naga refuses a program that writes to a buffer which the program declares as read-only.
 #[test]
 fn plans_read_contacts_that_a_resident_program_writes() {
-    let writes = |program: &Program, binding| match reflected(program).space(binding) {
+    let writes = |program: &Program, binding| match reflected(program, Target::Software).space(binding) {
         naga::AddressSpace::Storage { access } => access.contains(naga::StorageAccess::STORE),
         _ => false,
     };
@@ -115,7 +128,7 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
     for (measured, patch, friction) in
         [(false, false, FrictionRule::Disc), (true, false, FrictionRule::Box), (false, true, FrictionRule::Disc)]
     {
-        let reflected = reflected(&Program::OneDispatch(of(measured, patch, friction).into(), 16));
+        let reflected = reflected(&Program::OneDispatch(of(measured, patch, friction).into(), 16), Target::Software);
         assert_eq!(storage_buffers(&reflected), 8);
         assert_eq!(reflected.bindings.contains(&Binding::Convergence), measured);
         assert_eq!(reflected.module.entry_points[0].workgroup_size, [16, 1, 1]);
@@ -128,7 +141,7 @@ fn the_kernels_of_a_step_are_one_shader_in_a_small_world() {
 fn every_pass_of_the_one_dispatch_kernel_ends_with_a_barrier() {
     let kernels =
         [Kernel::IntegrateVelocities { warm_start: false, from_start: false }, Kernel::SolveContacts(Rules::default())];
-    let module = parsed(&Program::OneDispatch(kernels.into(), 16).source());
+    let module = parsed(&Program::OneDispatch(kernels.into(), 16).source(Target::Software));
     let [entry] = &module.entry_points[..] else { panic!("one entry point") };
     let mut bodies = Vec::new();
     for statement in entry.function.body.iter() {
@@ -150,7 +163,7 @@ fn every_pass_of_the_one_dispatch_kernel_ends_with_a_barrier() {
 #[test]
 fn every_color_of_a_pass_ends_with_a_barrier() {
     for kernel in swept() {
-        let module = parsed(&Program::Fused(kernel).source());
+        let module = parsed(&Program::Fused(kernel).source(Target::Software));
         let over_colors = |f: &&naga::Function| f.name.as_ref().is_some_and(|n| n.starts_with("over_colors"));
         let [function] = module.functions.iter().map(|(_, f)| f).filter(over_colors).collect::<Vec<_>>()[..] else {
             panic!("{kernel} goes over colors in one function")
@@ -171,7 +184,7 @@ fn every_color_of_a_pass_ends_with_a_barrier() {
 fn a_pass_over_rows_in_any_order_waits_for_nothing() {
     for kernel in swept() {
         for (program, waits) in [(Program::Pass(kernel), false), (Program::Fused(kernel), true)] {
-            assert_eq!(program.source().contains("Barrier()"), waits, "{program:?}");
+            assert_eq!(program.source(Target::Software).contains("Barrier()"), waits, "{program:?}");
         }
     }
 }
@@ -205,7 +218,7 @@ fn loops<'a>(statement: &'a naga::Statement, found: &mut Vec<&'a naga::Block>) {
 #[test]
 fn every_rule_reaches_the_sweep_as_a_constant() {
     let all = every_rules();
-    let source = |&rules: &Rules| Program::Pass(Kernel::SolveContacts(rules)).source();
+    let source = |&rules: &Rules| Program::Pass(Kernel::SolveContacts(rules)).source(Target::Hardware);
     let distinct: BTreeSet<_> = all.iter().map(source).collect();
     assert_eq!(distinct.len(), all.len());
 }
@@ -213,7 +226,7 @@ fn every_rule_reaches_the_sweep_as_a_constant() {
 #[test]
 fn the_series_of_a_rotation_has_the_coefficients_of_its_double() {
     // The last ones are too small to show in the bits of a rotation.
-    let module = parsed(&Program::Pass(Kernel::IntegratePositions { from_start: false }).source());
+    let module = parsed(&Program::Pass(Kernel::IntegratePositions { from_start: false }).source(Target::Software));
     let named = |f: &&naga::Function| f.name.as_deref() == Some("exp_rotation");
     let function = module.functions.iter().map(|(_, f)| f).find(named).expect("the function");
     let magnitude = |e: &naga::Expression| match e {

@@ -145,11 +145,11 @@ fn no_submission_of_a_plan_of_thousands_of_passes_takes_half_of_it() {
     };
     let whole = begun(HOURS, 1).remove(0);
     assert_eq!(whole.traffic.submissions, 1);
-    // A machine with other work lets the host wait now and then: the best of some steps counts.
+    // A machine with other work lets the host wait now and then, and a step may compile: the fastest of some steps counts.
     let asked = whole.times.run / 16;
     let steps = begun(asked, 5);
     let share = |stats: &StepStats| stats.traffic.longest_submission.as_secs_f64() / stats.times.run.as_secs_f64();
-    let best = steps.iter().min_by(|a, b| share(a).total_cmp(&share(b))).expect("some steps");
+    let best = steps.iter().min_by_key(|stats| stats.times.run).expect("some steps");
     measured!("{:?} of {:?}, {} submissions", share(best), best.times.run, best.traffic.submissions);
     assert!(share(best) < 0.5, "{:?} in {:?}", best.traffic, best.times.run);
     // The whole step may have taken longer than a step takes now.

@@ -24,6 +24,7 @@ tests! {
     }
     exact_gpu {
         every_kernel_gives_the_bits_of_its_double_in_exact_mode,
+        sweeps_of_hardware_give_the_bits_of_their_double,
         tiny_numbers_keep_their_bits_in_exact_mode,
         fast_spins_keep_their_bits_in_exact_mode,
         light_and_heavy_joints_keep_their_bits_in_exact_mode,
@@ -163,6 +164,24 @@ fn every_kernel_gives_the_bits_of_its_double_in_exact_mode() {
     for seed in SEEDS {
         assert_same(&mut gpu, &problems(seed), &format!("seed {seed}"));
     }
+}
+
+/// Sweeps over contacts have a text of their own for hardware. A software adapter compiles one of it for seconds.
+fn sweeps_of_hardware_give_the_bits_of_their_double() {
+    let (problems, mut gpu) = (problems(0), gpu::own_exact().cut_as_hardware());
+    let sweeps: Vec<_> = TRIED.iter().filter(|kernel| matches!(kernel, Kernel::SolveContacts(_))).collect();
+    let (mut tried, mut rules) = (0, HashSet::new());
+    for &&kernel in sweeps.iter().step_by(sweeps.len() / 8) {
+        let problem = &problems[usize::from(has_patches(kernel))];
+        let passes = color_by_color(kernel, problem);
+        let (ours, theirs) = (by_the_reference(problem, &passes), after(&mut gpu, problem, &passes));
+        assert_eq!(differing(&ours, &theirs), 0, "{kernel}");
+        let Rules { patch, as_one, friction_first, .. } = kernel.rules().expect("a sweep has rules");
+        rules.extend([("patch", patch), ("as one", as_one), ("friction first", friction_first)]);
+        tried += 1;
+    }
+    measured!("{tried} of {} sweeps, {rules:?}", sweeps.len());
+    assert_eq!(rules.len(), 6, "each with and without: {rules:?}");
 }
 
 fn tiny_numbers_keep_their_bits_in_exact_mode() {

@@ -101,7 +101,10 @@ impl Named for SolveMethod {
 
 impl Named for BackendChoice {
     const WORDS: &'static [(&'static str, &'static str)] = &[
-        ("auto", "A hardware GPU if a measurement on a small pile shows that it is faster; else the CPU"),
+        (
+            "auto",
+            "A hardware GPU if a measurement on a pile of the size of the scene shows that it is faster; else the CPU",
+        ),
         ("gpu", "The compute shaders, on the best adapter"),
         ("cpu", "The CPU lanes, on all threads"),
         ("reference", "The CPU reference, one constraint at a time on one thread"),

@@ -1,10 +1,10 @@
 //! The buffers of a device, one for each binding. A buffer grows with its rows, and the host remembers the content that
 //! it knows.
 
-use std::ops::Range;
 use std::pin::Pin;
 
 use futures_channel::oneshot;
+use rayon::prelude::*;
 
 use super::bindings::Binding;
 use super::submissions::Submissions;
@@ -12,6 +12,8 @@ use crate::error::{Error, Result};
 
 /// Size of a block that is compared and sent as a whole (B).
 const BLOCK: usize = 1024;
+/// Smallest number of blocks, or rows, for a thread.
+const MIN_BLOCKS: usize = 256;
 
 /// The buffers of a device.
 pub(super) struct Buffers {
@@ -134,17 +136,22 @@ impl Buffers {
     /// Sends those rows of a binding that the device does not have yet.
     pub fn update(&mut self, binding: Binding, bytes: &[u8]) -> Result<()> {
         self.reserve(binding, bytes.len())?;
-        let known = std::mem::take(&mut self.slots[binding as usize].known);
-        let blocks = (0..bytes.len()).step_by(BLOCK).map(|at| at..(at + BLOCK).min(bytes.len()));
-        let mut changed = blocks.filter(|block| known.get(block.clone()) != bytes.get(block.clone())).peekable();
-        while let Some(Range { start, mut end }) = changed.next() {
-            while let Some(next) = changed.next_if(|block| block.start == end) {
-                end = next.end;
-            }
-            self.write(binding, start, &bytes[start..end]);
+        let mut known = std::mem::take(&mut self.slots[binding as usize].known);
+        let size = known.len();
+        known.resize(bytes.len(), 0);
+        let is_changed = |&at: &usize| {
+            let block = at..(at + BLOCK).min(bytes.len());
+            block.end > size || known[block.clone()] != bytes[block]
+        };
+        let blocks = (0..bytes.len().div_ceil(BLOCK)).into_par_iter().with_min_len(MIN_BLOCKS);
+        let changed: Vec<usize> = blocks.map(|block| block * BLOCK).filter(is_changed).collect();
+        let ranges =
+            changed.chunk_by(|a, b| a + BLOCK == *b).map(|run| run[0]..(run[run.len() - 1] + BLOCK).min(bytes.len()));
+        for range in ranges {
+            self.write(binding, range.start, &bytes[range.clone()]);
+            known[range.clone()].copy_from_slice(&bytes[range]);
         }
         self.slots[binding as usize].known = known;
-        self.note(binding, bytes);
         Ok(())
     }
 
@@ -153,6 +160,18 @@ impl Buffers {
         let known = &mut self.slots[binding as usize].known;
         known.clear();
         known.extend_from_slice(bytes);
+    }
+
+    /// Records the content of a buffer from its rows.
+    pub fn note_rows<T: bytemuck::Pod + Send>(
+        &mut self,
+        binding: Binding,
+        rows: impl IndexedParallelIterator<Item = T>,
+    ) {
+        let known = &mut self.slots[binding as usize].known;
+        known.resize(rows.len() * size_of::<T>(), 0);
+        let places = known.par_chunks_exact_mut(size_of::<T>()).with_min_len(MIN_BLOCKS);
+        places.zip(rows).for_each(|(place, row)| place.copy_from_slice(bytemuck::bytes_of(&row)));
     }
 
     /// Waits until the device has confirmed the memory of each new buffer.
@@ -210,7 +229,9 @@ impl Buffers {
         let mapped = slice.get_mapped_range().map_err(|e| submissions.lost(e))?;
         let mut rest = &mapped[..];
         for (_, rows) in wanted {
-            rows.copy_from_slice(rest.split_off(..rows.len()).expect("as long as all rows"));
+            let from = rest.split_off(..rows.len()).expect("as long as all rows");
+            let (to, from) = (rows.par_chunks_mut(MIN_BLOCKS * BLOCK), from.par_chunks(MIN_BLOCKS * BLOCK));
+            to.zip(from).for_each(|(to, from)| to.copy_from_slice(from));
         }
         let numbers = bytemuck::pod_collect_to_vec(&mapped[own as usize..]);
         drop(mapped);

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::pipelines::Pipelines;
 use super::submissions::ROWS_OF_A_DISPATCH;
 use super::timer::Timer;
-use super::wgsl::{Program, WORKGROUP};
+use super::wgsl::{Program, Target, WORKGROUP};
 use crate::kernels::momentum::IMPULSES_PER_CHUNK;
 use crate::plan::{Kernel, Pass};
 use crate::problem::{PassRow, StepProblem};
@@ -27,13 +27,18 @@ impl Dispatch {
     }
 
     /// Enough workgroups for every row. Beyond the limit of a dispatch, each thread takes more rows.
-    fn workgroups(&self, rows_a_thread: u32) -> u32 {
-        (self.rows as u32).div_ceil(WORKGROUP * rows_a_thread).clamp(1, 65_535)
+    fn workgroups(&self, target: Target) -> u32 {
+        (self.rows as u32).div_ceil(self.program.threads(target) * target.rows_a_thread()).clamp(1, 65_535)
     }
 }
 
-/// A dispatch for each pass, and the buffer of their rows. Offsets in the buffer are multiples of `stride` bytes.
-pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -> (Vec<Dispatch>, Vec<u8>) {
+/// The dispatches of the passes, and the buffer of their rows. Offsets in the buffer are multiples of `stride` bytes.
+pub(super) fn of_passes(
+    problem: &StepProblem,
+    passes: &[Pass],
+    target: Target,
+    stride: usize,
+) -> (Vec<Dispatch>, Vec<u8>) {
     let mut bytes = Vec::new();
     let mut known = HashMap::new();
     let mut place = |pass: &Pass| {
@@ -46,26 +51,42 @@ pub(super) fn of_passes(problem: &StepProblem, passes: &[Pass], stride: usize) -
             at as u32
         })
     };
-    let dispatch = |pass: &Pass| {
-        // For some kernels the order of the rows does not matter.
-        let is_ordered = !matches!(
-            pass.kernel,
-            Kernel::ClearImpulses
-                | Kernel::SumImpulses { .. }
-                | Kernel::SumJointImpulses { .. }
-                | Kernel::MeasureJoints(_)
-        );
-        let pass_row = place(pass);
-        let dispatch = Dispatch { pass_row, ..Dispatch::over(Program::Pass(pass.kernel), rows_of(problem, pass)) };
-        if pass.colors.len() > 1 && is_ordered {
+    let dispatch = |part: Pass| {
+        let (program, rows) = match part.colors.len() > 1 && is_ordered(part.kernel) {
             // One workgroup.
-            Dispatch { program: Program::Fused(pass.kernel), rows: 1, ..dispatch }
-        } else {
-            dispatch
-        }
+            true => (Program::Fused(part.kernel), 1),
+            false => (Program::Pass(part.kernel), rows_of(problem, &part)),
+        };
+        Dispatch { pass_row: place(&part), ..Dispatch::over(program, rows) }
     };
-    let dispatches = passes.iter().map(dispatch).collect();
+    let dispatches = passes.iter().flat_map(|pass| parts(problem, pass, target)).map(dispatch).collect();
     (dispatches, bytes)
+}
+
+/// Whether a kernel needs its colors in order.
+fn is_ordered(kernel: Kernel) -> bool {
+    !matches!(
+        kernel,
+        Kernel::ClearImpulses | Kernel::SumImpulses { .. } | Kernel::SumJointImpulses { .. } | Kernel::MeasureJoints(_)
+    )
+}
+
+/// The parts of a pass that are one dispatch each. A workgroup sweeps several colors, but only if each of its threads
+/// takes all its rows of a color at a time.
+fn parts(problem: &StepProblem, pass: &Pass, target: Target) -> Vec<Pass> {
+    if pass.colors.len() < 2 || !is_ordered(pass.kernel) {
+        return vec![pass.clone()];
+    }
+    let most_rows = (WORKGROUP * target.rows_a_thread()) as usize;
+    let is_small = |color: u32| problem.rows_of(&(color..color + 1)).len() <= most_rows;
+    let mut parts: Vec<Pass> = Vec::new();
+    for color in pass.colors.clone() {
+        match parts.last_mut().filter(|part| is_small(color) && is_small(part.colors.end - 1)) {
+            Some(part) => part.colors.end += 1,
+            None => parts.push(Pass { colors: color..color + 1, ..pass.clone() }),
+        }
+    }
+    parts
 }
 
 /// Rows of a pass that threads can divide among them.
@@ -89,12 +110,12 @@ pub(super) fn first_part(dispatches: &[Dispatch], room: usize) -> usize {
     fits.count().max(1)
 }
 
-/// Encodes dispatches as one compute pass. A thread takes `rows_a_thread` rows if there are enough for every thread.
+/// Encodes dispatches as one compute pass.
 pub(super) fn encode(
     encoder: &mut wgpu::CommandEncoder,
     dispatches: &[Dispatch],
     pipelines: &Pipelines,
-    rows_a_thread: u32,
+    target: Target,
     mut timer: Option<&mut Timer>,
 ) {
     let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -107,7 +128,7 @@ pub(super) fn encode(
         for dispatch in run {
             let offsets: &[u32] = if compiled.has_pass_row() { &[dispatch.pass_row] } else { &[] };
             compute.set_bind_group(0, &compiled.bind_group, offsets);
-            compute.dispatch_workgroups(dispatch.workgroups(rows_a_thread), 1, 1);
+            compute.dispatch_workgroups(dispatch.workgroups(target), 1, 1);
         }
     }
     if let Some(timer) = timer {

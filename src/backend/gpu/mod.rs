@@ -36,6 +36,7 @@ pub use options::{Faults, GpuOptions, Loss};
 
 use super::cpu::Cpu;
 use super::{Backend, CheckedStep, Running};
+use crate::collide::MAX_POINTS;
 use crate::error::Result;
 use crate::plan::{Kernel, Pass, StepPlan};
 use crate::problem::carry::Carry;
@@ -46,13 +47,11 @@ use blocking::block_on;
 use buffers::Buffers;
 use dispatch::Dispatch;
 use pipelines::{Pipelines, Shaders};
+use rayon::prelude::*;
 use resident::ResidentRows;
 use submissions::{ROWS_OF_A_DISPATCH, Submissions};
 use timer::Timer;
-
-/// Number of rows for a thread of a software adapter. llvmpipe restarts every thread of a workgroup, which costs more
-/// than a loop over more rows: a step of a settled pile of 1,000 takes 13.1 ms with 1 row a thread and 11.7 ms with 4.
-const SOFTWARE_ROWS_A_THREAD: u32 = 4;
+use wgsl::Target;
 
 /// Largest number of devices in one run. After that many losses the processor continues.
 const MAX_DEVICES: usize = 3;
@@ -75,8 +74,8 @@ pub struct Gpu {
     options: GpuOptions,
     /// Number of devices that were lost before this one.
     lost: usize,
-    /// Number of rows for a thread of a dispatch.
-    rows_a_thread: u32,
+    /// The kind of adapter for which programs are written.
+    target: Target,
     pipelines: Pipelines,
     buffers: Buffers,
     submissions: Submissions,
@@ -86,10 +85,9 @@ pub struct Gpu {
     /// The rows of the last step, if the next step can continue from them.
     rows: Option<ResidentRows>,
     /// Reusable memory of a step.
-    separations: Vec<f32>,
+    separations: Vec<[f32; MAX_POINTS]>,
     colors: Vec<u32>,
     systems: Vec<u32>,
-    states: Vec<BodyRow>,
 }
 
 impl Gpu {
@@ -145,11 +143,14 @@ impl Gpu {
         let (adapter, summary) = adapter::find(options.adapter, &options.name).await?;
         let loss = losses.get(lost).copied();
         let shaders = match options.exact {
-            true if summary.takes_spirv && !options.guarded => Shaders::Spirv,
+            #[cfg(not(target_family = "wasm"))]
+            true if summary.takes_spirv && !options.guarded => {
+                Shaders::Spirv(spirv_exact::knows_float_controls(&adapter))
+            }
             true => Shaders::Guarded,
             false => Shaders::Plain,
         };
-        let (device, queue) = adapter::open(&adapter, shaders == Shaders::Spirv).await?;
+        let (device, queue) = adapter::open(&adapter, options.exact && summary.takes_spirv && !options.guarded).await?;
         let name = || summary.name.clone();
         Ok(Self {
             pipelines: Pipelines::new(device.clone(), shaders, *shader, options.cache.as_deref()),
@@ -158,7 +159,7 @@ impl Gpu {
             timer: None,
             device,
             queue,
-            rows_a_thread: if summary.hardware { 1 } else { SOFTWARE_ROWS_A_THREAD },
+            target: if summary.hardware { Target::Hardware } else { Target::Software },
             summary,
             options,
             lost,
@@ -168,7 +169,6 @@ impl Gpu {
             separations: Vec::new(),
             colors: Vec::new(),
             systems: Vec::new(),
-            states: Vec::new(),
         })
     }
 
@@ -177,9 +177,10 @@ impl Gpu {
         &self.summary
     }
 
-    /// Divides its work as for hardware, so that a software adapter runs the dispatches of a hardware adapter.
+    /// Writes programs as for hardware, so that a software adapter runs the programs and dispatches of a hardware
+    /// adapter.
     pub fn cut_as_hardware(mut self) -> Self {
-        self.rows_a_thread = 1;
+        self.target = Target::Hardware;
         self
     }
 
@@ -245,29 +246,29 @@ impl Gpu {
         // The timer measures each kernel separately. One dispatch cannot be divided, unlike a long plan.
         let work = passes.len() * ROWS_OF_A_DISPATCH;
         let together = together && self.timer.is_none() && work <= self.submissions.room();
-        match one_dispatch::of(problem, passes).filter(|_| together) {
+        match one_dispatch::of(problem, passes, self.target).filter(|_| together) {
             Some((program, table)) => {
                 self.buffers.update(Binding::Passes, bytemuck::cast_slice(&table))?;
-                let (_, rows) = dispatch::of_passes(problem, &passes[..1], stride);
+                let (_, rows) = dispatch::of_passes(problem, &passes[..1], self.target, stride);
                 self.buffers.update(Binding::PassRow, &rows)?;
                 all.push(Dispatch { work, ..Dispatch::over(program, 1) });
             }
             None => {
-                let (dispatches, rows) = dispatch::of_passes(problem, passes, stride);
+                let (dispatches, rows) = dispatch::of_passes(problem, passes, self.target, stride);
                 self.buffers.update(Binding::PassRow, &rows)?;
                 all.extend(dispatches);
             }
         }
         self.traffic.dispatches = all.len();
         for dispatch in &all {
-            self.pipelines.prepare(&dispatch.program, &self.buffers)?;
+            self.pipelines.prepare(&dispatch.program, self.target, &self.buffers)?;
         }
         self.timer.iter_mut().for_each(Timer::begin);
         let mut rest = &all[..];
         loop {
             let (part, later) = rest.split_at(dispatch::first_part(rest, self.submissions.room()));
             let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            dispatch::encode(&mut encoder, part, &self.pipelines, self.rows_a_thread, self.timer.as_mut());
+            dispatch::encode(&mut encoder, part, &self.pipelines, self.target, self.timer.as_mut());
             let rows = part.iter().map(|dispatch| dispatch.work).sum();
             // A submission must not use a missing buffer.
             self.buffers.settle().await?;
@@ -366,14 +367,13 @@ impl Backend for Gpu {
             self.count_bytes(problem, passes);
             for (binding, bytes) in rows::changed(problem) {
                 // The host does not compare impulses of contacts with those of the step before.
-                if !matches!(binding, Binding::Impulses | Binding::Totals) {
+                if !matches!(binding, Binding::Bodies | Binding::Impulses | Binding::Totals) {
                     self.buffers.note(binding, bytes);
                 }
             }
             // The next step begins with begin_bodies.
-            self.states.clear();
-            self.states.extend(problem.bodies.iter().map(|b| BodyRow { v: b.v, w: b.w, ..BodyRow::AT_REST }));
-            self.buffers.note(Binding::Bodies, bytemuck::cast_slice(&self.states));
+            let state = |body: &BodyRow| BodyRow { v: body.v, w: body.w, ..BodyRow::AT_REST };
+            self.buffers.note_rows(Binding::Bodies, problem.bodies.par_iter().map(state));
             self.rows = Some(ResidentRows::of(problem));
             Ok(())
         })
@@ -397,7 +397,7 @@ impl Backend for Gpu {
                 if lost < MAX_DEVICES { Self::open_after(lost, self.options.clone()).await.ok() } else { None };
             Some(match opened {
                 Some(mut gpu) => {
-                    gpu.rows_a_thread = self.rows_a_thread;
+                    gpu.target = self.target;
                     if self.timer.is_some() {
                         gpu.timer = Timer::new(&gpu.device, &gpu.queue);
                     }

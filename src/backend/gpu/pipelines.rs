@@ -9,7 +9,7 @@ use super::kept::KeptPipelines;
 use super::reflect::Reflected;
 #[cfg(not(target_family = "wasm"))]
 use super::spirv_exact;
-use super::wgsl::{ENTRY_POINT, Program};
+use super::wgsl::{ENTRY_POINT, Program, Target};
 use super::wgsl_exact::exact_wgsl;
 use crate::error::Result;
 use crate::problem::PassRow;
@@ -19,8 +19,9 @@ use crate::problem::PassRow;
 pub(super) enum Shaders {
     /// As WGSL, which the driver may reassociate.
     Plain,
-    /// As SPIR-V that forbids reassociation.
-    Spirv,
+    /// As SPIR-V that forbids reassociation, with or without float controls.
+    #[cfg(not(target_family = "wasm"))]
+    Spirv(bool),
     /// As WGSL with guarded arithmetic.
     Guarded,
 }
@@ -86,7 +87,7 @@ impl Pipelines {
     }
 
     /// Compiles a program once, and binds it to the present buffers.
-    pub fn prepare(&mut self, program: &Program, buffers: &Buffers) -> Result<()> {
+    pub fn prepare(&mut self, program: &Program, target: Target, buffers: &Buffers) -> Result<()> {
         if let Some(compiled) = self.compiled.get_mut(program) {
             if compiled.generation != buffers.generation {
                 compiled.bind_group = bind(&self.device, buffers, &compiled.layout, &compiled.bindings);
@@ -94,7 +95,7 @@ impl Pipelines {
             }
             return Ok(());
         }
-        let (name, mut source) = (program.name(), program.source());
+        let (name, mut source) = (program.name(), program.source(target));
         if let Some(fault) = self.fault {
             source = fault(name, source);
         }
@@ -107,7 +108,7 @@ impl Pipelines {
         let layout = layout(&self.device, &reflected);
         let module = match self.shaders {
             #[cfg(not(target_family = "wasm"))]
-            Shaders::Spirv => spirv_exact::shader_module(&self.device, &reflected)?,
+            Shaders::Spirv(float_controls) => spirv_exact::shader_module(&self.device, &reflected, float_controls)?,
             _ => self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(source.into()),

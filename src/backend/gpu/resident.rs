@@ -1,6 +1,7 @@
 //! Rows that stay on the device, and their update from one step to the next.
 
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 
 use super::bindings::Binding;
 use super::buffers::Buffers;
@@ -14,6 +15,9 @@ use crate::problem::{ContactRow, StepProblem};
 
 // The shader writes no impulse to a point whose earlier index is `MAX_POINTS` or more.
 const _: () = assert!(NO_POINT as usize == MAX_POINTS);
+
+/// Smallest number of contacts for a thread.
+const MIN_CONTACTS: usize = 1024;
 
 /// The rows that a step left on the device.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +109,7 @@ pub(super) async fn begin(
     problem: &StepProblem,
     carry: &Carry,
     before: ResidentRows,
-    separations: &mut Vec<f32>,
+    separations: &mut Vec<[f32; MAX_POINTS]>,
 ) -> Result<Vec<Dispatch>> {
     let swept = problem.rows_of(&problem.contact_colors());
     let params = ResidentParams {
@@ -133,11 +137,11 @@ pub(super) async fn begin(
     if carry.approach {
         buffers.send(Binding::Points, bytemuck::cast_slice(&problem.points))?;
     }
-    separations.clear();
-    for &row in swept {
+    let of_contact = |&row: &u32| {
         let first = problem.contacts[row as usize].first_point as usize;
-        separations.extend(problem.points[first..first + MAX_POINTS].iter().map(|point| point.separation));
-    }
+        std::array::from_fn(|k| problem.points[first + k].separation)
+    };
+    swept.par_iter().with_min_len(MIN_CONTACTS).map(of_contact).collect_into_vec(separations);
     buffers.send(Binding::Separations, bytemuck::cast_slice(separations))?;
     programs.push(Dispatch::over(Program::BeginContacts, swept.len()));
     Ok(programs)

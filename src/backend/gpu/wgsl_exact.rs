@@ -2,8 +2,8 @@
 //!
 //! WGSL allows a compiler to reassociate and to fuse operations. Here every sum, difference and product passes through
 //! an exclusive or of its bits with an integer that the host sets to 0. No compiler knows that value, so each result is
-//! rounded before its use. Selects between floats also go through integers: a compiler could turn them into a minimum
-//! or maximum, which may return either signed zero. Zeros are guarded too: a compiler could replace the product of 0
+//! rounded before its use. Selects between floats also go through integers, and comparisons have guarded sides: a
+//! compiler could turn them into a minimum or maximum, which may return either signed zero. Zeros are guarded too: a compiler could replace the product of 0
 //! and x by 0, and the sum of 0 and x by x, without regard to signs. Signs are guarded as well: otherwise the negation
 //! of 0 could be 0.
 
@@ -27,8 +27,26 @@ pub fn exact_wgsl(reflected: &Reflected, source: &str) -> String {
     let entry = (&module.entry_points[0].function, reflected.info.get_entry_point(0));
     for (function, info) in functions.chain([entry]) {
         for (handle, expression) in function.expressions.iter() {
-            let Some(size) = floats(&info[handle].ty, module) else { continue };
             let span = |handle: Handle<Expression>| function.expressions.get_span(handle).to_range();
+            if let Expression::Binary { op, left, right } = *expression
+                && let Some(sign) = comparison(op)
+                && floats(&info[left].ty, module) == Some(1)
+                && let Some(range) = span(handle)
+            {
+                let is_free = |side| {
+                    !matches!(
+                        function.expressions[side],
+                        Expression::Literal(_)
+                            | Expression::Binary {
+                                op: BinaryOperator::Add | BinaryOperator::Subtract | BinaryOperator::Multiply,
+                                ..
+                            }
+                    )
+                };
+                edits.compare(source, range, sign, [left, right].map(is_free));
+                continue;
+            }
+            let Some(size) = floats(&info[handle].ty, module) else { continue };
             let Some(range) = span(handle) else { continue };
             match *expression {
                 Expression::Binary {
@@ -43,6 +61,19 @@ pub fn exact_wgsl(reflected: &Reflected, source: &str) -> String {
     }
     edits.guard_zeros(source);
     edits.apply(source) + &functions_of(zero(reflected))
+}
+
+/// The sign of a comparison; `None` for other operations.
+fn comparison(op: BinaryOperator) -> Option<&'static str> {
+    Some(match op {
+        BinaryOperator::Equal => "==",
+        BinaryOperator::NotEqual => "!=",
+        BinaryOperator::Less => "<",
+        BinaryOperator::LessEqual => "<=",
+        BinaryOperator::Greater => ">",
+        BinaryOperator::GreaterEqual => ">=",
+        _ => return None,
+    })
 }
 
 /// Number of floats in a value, or `None` for other types.
@@ -135,6 +166,19 @@ impl Edits {
     fn negate(&mut self, source: &str, Range { start, end }: Range<usize>, size: usize) {
         debug_assert!(source[start..].starts_with('-'), "{}", &source[start..end]);
         self.wrap(start..end, 1, format!("opposite_{size}("));
+    }
+
+    /// Wraps those sides of a comparison in the guard function that are `free`.
+    fn compare(&mut self, source: &str, Range { start, end }: Range<usize>, sign: &str, free: [bool; 2]) {
+        let text = &source[start..end];
+        let (left, _) = text.split_once(&format!(" {sign} ")).expect("spaces around a sign");
+        let right = start + left.len() + sign.len() + 2;
+        // These calls are outside of everything else that begins at the same place.
+        let sides = [start..start + left.len(), right..end].into_iter().zip(free);
+        for (side, _) in sides.filter(|(_, is_free)| *is_free) {
+            self.add(side.start, 0, "guarded_1(".into(), end + 1);
+            self.add(side.end, 0, ")".into(), side.end);
+        }
     }
 
     fn choose(&mut self, source: &str, Range { start, end }: Range<usize>, size: usize) {

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::every_program;
+use super::every_text;
 use drystone::config::FrictionRule;
-use drystone::stages::backend::shader::{Program, Reflected, exact_spirv};
+use drystone::stages::backend::shader::{Program, Reflected, Target, exact_spirv};
 use drystone::stages::kernels::Rules;
 use drystone::stages::plan::Kernel;
 
@@ -68,14 +68,55 @@ fn inexact(words: &[u32]) -> BTreeSet<u32> {
 
 fn spirv(source: &str) -> Vec<u32> {
     let reflected = Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}"));
-    exact_spirv(&reflected).expect("naga writes SPIR-V")
+    exact_spirv(&reflected, false).expect("naga writes SPIR-V")
 }
 
 #[test]
 fn every_program_only_adds_and_multiplies_and_may_not_be_fused() {
-    for program in every_program() {
-        assert_eq!(inexact(&spirv(&program.source())), BTreeSet::new(), "{program:?}");
+    for (program, target) in every_text() {
+        assert_eq!(inexact(&spirv(&program.source(target))), BTreeSet::new(), "{program:?}, {target:?}");
     }
+}
+
+/// A driver may flush subnormal numbers and drop the signs of zeros unless a program forbids it. It may refuse a program whose
+/// instructions stand in another order than that of the specification: capabilities, extensions, entry point, modes.
+#[test]
+fn float_controls_stand_where_the_specification_wants_them() {
+    const CAPABILITY: u32 = 17;
+    const EXTENSION: u32 = 10;
+    const ENTRY_POINT: u32 = 15;
+    const EXECUTION_MODE: u32 = 16;
+    let program = Program::Pass(Kernel::SolveContacts(Rules::default()));
+    let reflected = Reflected::new("test", &program.source(Target::Software)).unwrap_or_else(|e| panic!("{e}"));
+    let [plain, both] = [false, true].map(|modes| exact_spirv(&reflected, modes).expect("naga writes SPIR-V"));
+    let place = |opcode, operands: &[u32]| {
+        let found = instructions(&both).iter().position(|(o, own)| *o == opcode && own.starts_with(operands));
+        found.unwrap_or_else(|| panic!("no instruction {opcode} {operands:?}"))
+    };
+    let entry =
+        instructions(&both).into_iter().find(|(opcode, _)| *opcode == ENTRY_POINT).expect("an entry point").1[1];
+    let order = [
+        place(CAPABILITY, &[4464]),
+        place(CAPABILITY, &[4466]),
+        place(EXTENSION, &bytemuck::pod_collect_to_vec(b"SPV_KHR_float_controls\0\0")),
+        place(ENTRY_POINT, &[]),
+        place(EXECUTION_MODE, &[entry, 4459, 32]),
+        place(EXECUTION_MODE, &[entry, 4461, 32]),
+        place(DECORATE, &[]),
+    ];
+    assert!(order.is_sorted(), "{order:?}");
+    let last = |opcode| instructions(&both).iter().rposition(|(o, _)| *o == opcode).expect("an instruction");
+    assert!(last(CAPABILITY) < order[2], "no capability follows the extension");
+    // Nothing else changed.
+    let added = [4464, 4466, 4459, 4461];
+    assert_eq!(instructions(&plain).len() + 5, instructions(&both).len());
+    let is_old = |(opcode, operands): &(u32, &[u32])| match *opcode {
+        CAPABILITY => !added.contains(&operands[0]),
+        EXECUTION_MODE => !added.contains(&operands[1]),
+        opcode => opcode != EXTENSION,
+    };
+    let old: Vec<_> = instructions(&both).into_iter().filter(is_old).collect();
+    assert_eq!(old, instructions(&plain).into_iter().filter(is_old).collect::<Vec<_>>());
 }
 
 /// The words of a kernel that computes one expression of `x: array<f32>`.
@@ -138,8 +179,9 @@ fn no_index_leaves_its_buffer() {
         Kernel::IntegratePositions { from_start: false },
     ]
     .into();
-    for program in every_program().into_iter().chain([Program::OneDispatch(small_world, 16)]) {
-        let (count, unbounded) = indices(&spirv(&program.source()));
+    let small_world = (Program::OneDispatch(small_world, 16), Target::Software);
+    for (program, target) in every_text().into_iter().chain([small_world]) {
+        let (count, unbounded) = indices(&spirv(&program.source(target)));
         // One kernel reads no more than one row.
         let has_rows = program.name() != "begin_sweep";
         assert!(unbounded == 0 && (count > 0) == has_rows, "{program:?}: {unbounded} of {count} indices");

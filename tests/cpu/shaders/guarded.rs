@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use naga::{BinaryOperator, Expression, Handle, Literal, ScalarKind, TypeInner};
 
-use super::every_program;
-use drystone::stages::backend::shader::{Program, Reflected, exact_wgsl};
+use super::{every_program, every_text};
+use drystone::stages::backend::shader::{Program, Reflected, Target, exact_wgsl};
 
 fn guarded(source: &str) -> String {
     exact_wgsl(&Reflected::new("test", source).unwrap_or_else(|e| panic!("{e}")), source)
@@ -94,11 +94,11 @@ fn calls(block: &naga::Block, each: EachCall) {
 
 #[test]
 fn integers_steer_every_sum_product_and_choice() {
-    for program in every_program() {
-        assert_eq!(free(&guarded(&program.source())), BTreeSet::new(), "{program:?}");
+    for (program, target) in every_text() {
+        assert_eq!(free(&guarded(&program.source(target))), BTreeSet::new(), "{program:?}, {target:?}");
     }
     // Plain WGSL has hundreds.
-    assert!(!free(&every_program()[0].source()).is_empty());
+    assert!(!free(&every_program()[0].source(Target::Software)).is_empty());
 }
 
 /// A program that computes as `text` says with `x: array<f32>` and `v: vec3f`.
@@ -120,10 +120,10 @@ fn what_a_compiler_may_change_is_found_and_guarded() {
         ("v = s * s * v;", "v = guarded_3(guarded_1(s * s) * v);"),
         ("s = s * x[1] + 0.0;", "s = guarded_1(guarded_1(s * x[1]) + guarded_1(0.0));"),
         ("v = vec3f(1.0, 0.0, s) - vec3f();", "v = guarded_3(vec3f(1.0, guarded_1(0.0), s) - guarded_3(vec3f()));"),
-        ("if s > 0.0 { s = 0.05 - 10.0 * s; }", "if s > 0.0 { s = guarded_1(0.05 - guarded_1(10.0 * s)); }"),
+        ("if s > 0.0 { s = 0.05 - 10.0 * s; }", "if guarded_1(s) > 0.0 { s = guarded_1(0.05 - guarded_1(10.0 * s)); }"),
         ("s = -(s * x[1]);", "s = opposite_1((guarded_1(s * x[1])));"),
         ("v = -v * s - v;", "v = guarded_3(guarded_3(opposite_3(v) * s) - v);"),
-        ("s = select(s, x[1], s > x[1]);", "s = chosen_1(s, x[1], s > x[1]);"),
+        ("s = select(s, x[1], s > x[1]);", "s = chosen_1(s, x[1], guarded_1(s) > guarded_1(x[1]));"),
         ("s = select(s * 2.0, s, s * s > 1.0);", "s = chosen_1(guarded_1(s * 2.0), s, guarded_1(s * s) > 1.0);"),
     ] {
         let plain = program(text);
@@ -142,7 +142,7 @@ fn what_a_compiler_may_change_is_found_and_guarded() {
 #[test]
 fn the_number_that_steers_is_one_of_the_program() {
     for program in [Program::RESIDENT[1].clone(), every_program()[0].clone()] {
-        let text = guarded(&program.source());
+        let text = guarded(&program.source(Target::Software));
         let of_begin = Program::RESIDENT.contains(&program);
         assert_eq!(text.contains("resident.zero"), of_begin, "{program:?}");
         assert_eq!(text.contains("params.zero"), !of_begin, "{program:?}");
