@@ -96,6 +96,14 @@ fn work_cut_as_for_hardware_has_the_bits_of_the_reference() {
     };
     let (ours, theirs) = (after(reference()), after(Box::new(gpu::own_exact().cut_as_hardware())));
     assert_eq!(Difference::between(&ours, &theirs).bodies, 0);
+    // Colors in one pass have a dispatch each if they have more rows than a workgroup of hardware has threads.
+    config.fuse_colors_below = u32::MAX;
+    let scene = Scene::find("pyramid", &["base=40".into()]).expect("a scene of the catalogue");
+    let mut simulation =
+        Simulation::with(scene.world, config, Box::new(gpu::own_exact().cut_as_hardware())).expect("good settings");
+    let stats = simulation.step(scene.dt).expect("a step");
+    let (dispatches, passes) = (stats.traffic.dispatches, simulation.plan().passes.len());
+    assert!(dispatches > passes + 20, "{dispatches} dispatches of {passes} passes");
 }
 
 /// One body of every shape, all of which bounce, and a chain of long links: every kernel has work.
