@@ -362,7 +362,7 @@ impl StepPlan {
 
 /// Splits colors into groups. A color with at least `fuse_below` rows is a group of its own; neighboring smaller colors
 /// form one group.
-fn color_groups(offsets: &[u32], colors: Range<u32>, fuse_below: u32) -> Vec<Range<u32>> {
+pub(crate) fn color_groups(offsets: &[u32], colors: Range<u32>, fuse_below: u32) -> Vec<Range<u32>> {
     let mut groups: Vec<Range<u32>> = Vec::new();
     let mut last_is_small = false;
     for color in colors {

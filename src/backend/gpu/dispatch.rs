@@ -7,7 +7,7 @@ use super::submissions::ROWS_OF_A_DISPATCH;
 use super::timer::Timer;
 use super::wgsl::{Program, Target, WORKGROUP};
 use crate::kernels::momentum::IMPULSES_PER_CHUNK;
-use crate::plan::{Kernel, Pass};
+use crate::plan::{Kernel, Pass, color_groups};
 use crate::problem::{PassRow, StepProblem};
 
 pub(super) struct Dispatch {
@@ -77,16 +77,9 @@ fn parts(problem: &StepProblem, pass: &Pass, target: Target) -> Vec<Pass> {
     if pass.colors.len() < 2 || !is_ordered(pass.kernel) {
         return vec![pass.clone()];
     }
-    let most_rows = (WORKGROUP * target.rows_a_thread()) as usize;
-    let is_small = |color: u32| problem.rows_of(&(color..color + 1)).len() <= most_rows;
-    let mut parts: Vec<Pass> = Vec::new();
-    for color in pass.colors.clone() {
-        match parts.last_mut().filter(|part| is_small(color) && is_small(part.colors.end - 1)) {
-            Some(part) => part.colors.end += 1,
-            None => parts.push(Pass { colors: color..color + 1, ..pass.clone() }),
-        }
-    }
-    parts
+    let most_rows = WORKGROUP * target.rows_a_thread();
+    let groups = color_groups(&problem.colors, pass.colors.clone(), most_rows + 1);
+    groups.into_iter().map(|colors| Pass { colors, ..pass.clone() }).collect()
 }
 
 /// Rows of a pass that threads can divide among them.

@@ -34,6 +34,8 @@ pub(crate) mod wgsl_exact;
 pub use adapter::{AdapterChoice, AdapterSummary, adapters, adapters_async, open_device, open_for_surface};
 pub use options::{Faults, GpuOptions, Loss};
 
+use rayon::prelude::*;
+
 use super::cpu::Cpu;
 use super::{Backend, CheckedStep, Running};
 use crate::collide::MAX_POINTS;
@@ -47,7 +49,6 @@ use blocking::block_on;
 use buffers::Buffers;
 use dispatch::Dispatch;
 use pipelines::{Pipelines, Shaders};
-use rayon::prelude::*;
 use resident::ResidentRows;
 use submissions::{ROWS_OF_A_DISPATCH, Submissions};
 use timer::Timer;
@@ -142,15 +143,14 @@ impl Gpu {
         let Faults { shader, losses } = &options.faults;
         let (adapter, summary) = adapter::find(options.adapter, &options.name).await?;
         let loss = losses.get(lost).copied();
+        let by_spirv = options.exact && summary.takes_spirv && !options.guarded;
         let shaders = match options.exact {
             #[cfg(not(target_family = "wasm"))]
-            true if summary.takes_spirv && !options.guarded => {
-                Shaders::Spirv(spirv_exact::knows_float_controls(&adapter))
-            }
+            true if by_spirv => Shaders::Spirv(spirv_exact::knows_float_controls(&adapter)),
             true => Shaders::Guarded,
             false => Shaders::Plain,
         };
-        let (device, queue) = adapter::open(&adapter, options.exact && summary.takes_spirv && !options.guarded).await?;
+        let (device, queue) = adapter::open(&adapter, by_spirv).await?;
         let name = || summary.name.clone();
         Ok(Self {
             pipelines: Pipelines::new(device.clone(), shaders, *shader, options.cache.as_deref()),

@@ -28,20 +28,31 @@ fn is_arithmetic(opcode: u32) -> bool {
     matches!(opcode, 127 | 129 | 131 | 133 | 136 | 140 | 141 | 142..=148)
 }
 
+/// The instructions of a module.
+fn instructions(words: &[u32]) -> impl Iterator<Item = &[u32]> {
+    let mut rest = &words[HEADER..];
+    std::iter::from_fn(move || {
+        let length = (*rest.first()? >> 16).max(1) as usize;
+        let own;
+        (own, rest) = rest.split_at(length);
+        Some(own)
+    })
+}
+
 /// The same module with a decoration on every arithmetic result.
 fn without_contraction(words: &[u32]) -> Vec<u32> {
     let mut decorations = Vec::new();
     let mut annotations_begin = None;
     let mut at = HEADER;
-    while at < words.len() {
-        let (length, opcode) = ((words[at] >> 16) as usize, words[at] & 0xffff);
+    for own in instructions(words) {
+        let opcode = own[0] & 0xffff;
         if matches!(opcode, OP_DECORATE | OP_MEMBER_DECORATE) {
             annotations_begin.get_or_insert(at);
         }
         if is_arithmetic(opcode) {
-            decorations.extend([3 << 16 | OP_DECORATE, words[at + 2], NO_CONTRACTION]);
+            decorations.extend([3 << 16 | OP_DECORATE, own[2], NO_CONTRACTION]);
         }
-        at += length.max(1);
+        at += own.len();
     }
     // Annotations are contiguous, and every kernel has some: its bindings.
     let split = annotations_begin.unwrap_or(words.len());
@@ -80,10 +91,9 @@ fn with_float_controls(words: &[u32]) -> Vec<u32> {
         |opcode: u32, operands: &[u32]| [&[(operands.len() as u32 + 1) << 16 | opcode], operands].concat();
     let name: Vec<u32> = bytemuck::pod_collect_to_vec(b"SPV_KHR_float_controls\0\0");
     let mut changed = words[..HEADER].to_vec();
-    let (mut rest, mut before, mut entry_point) = (&words[HEADER..], OP_CAPABILITY, 0);
-    while let Some(&first) = rest.first() {
-        let (own, later) = rest.split_at((first >> 16).max(1) as usize);
-        let opcode = first & 0xffff;
+    let (mut before, mut entry_point) = (OP_CAPABILITY, 0);
+    for own in instructions(words) {
+        let opcode = own[0] & 0xffff;
         // Extensions follow the capabilities, which come first. Execution modes follow the only entry point.
         if before == OP_CAPABILITY && opcode != OP_CAPABILITY {
             changed.extend(MODES.iter().flat_map(|[_, capability]| instruction(OP_CAPABILITY, &[*capability])));
@@ -97,7 +107,7 @@ fn with_float_controls(words: &[u32]) -> Vec<u32> {
             entry_point = own[2];
         }
         changed.extend_from_slice(own);
-        (rest, before) = (later, opcode);
+        before = opcode;
     }
     changed
 }
@@ -153,10 +163,10 @@ pub(super) fn shader_module(
     };
     // SAFETY: the driver does not check these words, so they must be valid, and their indices must stay inside the
     // bound buffers. They are valid: naga wrote them from a module that it validated, and `without_contraction` only
-    // adds decorations, and `with_float_controls` modes that Vulkan 1.2 has. Indices stay inside: `CheckedStep` guarantees that the indices in a problem's rows and in a
-    // pass's colors name existing rows, and `exact_spirv` lets naga limit every index to the length of its buffer for
-    // any rows (test: `tests/cpu/shaders.rs`). `Pipelines::prepare` makes the layout of the bindings from the same
-    // module.
+    // adds decorations, and `with_float_controls` modes that Vulkan 1.2 has. Indices stay inside: `CheckedStep`
+    // guarantees that the indices in a problem's rows and in a pass's colors name existing rows, and `exact_spirv` lets
+    // naga limit every index to the length of its buffer for any rows (test: `tests/cpu/shaders.rs`).
+    // `Pipelines::prepare` makes the layout of the bindings from the same module.
     Ok(unsafe { device.create_shader_module_passthrough(descriptor) })
 }
 
