@@ -27,7 +27,7 @@ tests! {
 }
 
 fn main() -> std::process::ExitCode {
-    common::harness::run([tests()])
+    common::harness::run_in_turn([tests()])
 }
 
 const SIZE: (u32, u32) = (192, 128);
