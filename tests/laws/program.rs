@@ -217,9 +217,9 @@ fn answer(options: &Options) -> Result<(), String> {
             write(&case.scene, path)?;
         }
         let verdict = run::run_on(&case, Box::new(Cpu::new()), options.trace);
-        for (step, [motion, weight, springs, work, taken, refused]) in verdict.trace.iter().enumerate() {
+        for (step, [motion, weight, springs, work, taken, refused, spin]) in verdict.trace.iter().enumerate() {
             println!(
-                "{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e} taken {taken:.3e} refused {refused}",
+                "{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e} taken {taken:.3e} refused {refused} spin {spin:.3e}",
                 motion + weight + springs - work
             );
         }

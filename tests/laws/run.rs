@@ -72,8 +72,9 @@ pub struct Verdict {
     pub drift: Option<[f64; 2]>,
     /// The most substeps of a body.
     pub substeps: u32,
-    /// The energy of each step, where asked for: kinetic, potential, of springs, work, taken by the law; then the steps that it refused.
-    pub trace: Vec<[f64; 6]>,
+    /// The energy of each step, where asked for: kinetic, potential, of springs, work, taken by the law; then the steps that it refused, and the
+    /// change of angular momentum since the start where nothing outside touches (kg m²/s).
+    pub trace: Vec<[f64; 7]>,
 }
 
 impl Verdict {
@@ -425,6 +426,7 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
                 work,
                 stats.energy_taken,
                 stats.refused as f64,
+                if alone { (after.spin - start.spin).length() } else { 0.0 },
             ]);
         }
         (before, springs_before) = (after, springs);
