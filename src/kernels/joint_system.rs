@@ -4,9 +4,10 @@
 //!
 //! A node of a system is up to three rows of one joint: its anchors, its locks and limits of shifts, or those of turns.
 //! Drives are swept (`solve_axes`). Limits are swept until they have an impulse, and hold like locks from then on. A
-//! limit that would pull returns to the sweeps: the solver removes its row and factors the system without it. Arms and
-//! axes turn with their bodies, and the blocks of S with them, so S is factored anew when bodies have moved. The
-//! problem lists the order of elimination, the nonzero blocks, and the products in each block (`JointSystems`).
+//! limit that would pull returns to the sweeps: the solver takes its impulse back, removes its row, and factors the system
+//! without it. Arms and axes turn with their bodies, and the blocks of S with them, so S is factored anew when bodies
+//! have moved. The problem lists the order of elimination, the nonzero blocks, and the products in each block
+//! (`JointSystems`).
 
 use super::Rules;
 use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock, select3};
@@ -14,7 +15,7 @@ use super::joint::current_anchors;
 use super::pair::{relative_movement, relative_velocity};
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, turned, vec3};
-use crate::problem::JointSystems;
+use crate::problem::{JointSystems, NodeRow};
 
 /// A block of a matrix, as three columns. Each column has a fourth number, which nothing reads, so that a column of
 /// single numbers fills a register. Only columns of single numbers compute with it ([`Lane::COLUMN`]).
@@ -356,6 +357,8 @@ pub trait SystemRows<L: Lane> {
     fn impulse(&self, node: usize, row: usize) -> L;
     /// The velocity that a row lacks.
     fn lacking(&self, node: usize, row: usize) -> L;
+    /// Stores another velocity that a row lacks.
+    fn set_lacking(&mut self, node: usize, row: usize, lacking: L);
     /// Stores a correction, and adds it to the impulse.
     fn change(&mut self, node: usize, row: usize, change: L);
 }
@@ -476,6 +479,9 @@ pub fn solve_system<L: Lane>(
     // Systems side by side begin together. A system that keeps all its limits is factored and solved again with the
     // same bits, while others let go of some.
     let is_new = L::any(L::default().gt(factors.nodes[0].softness));
+    if !is_new {
+        leave_out_free(systems, system, rows, &factors);
+    }
     let mut changed = let_go(systems, system, is_new, rows, &mut factors) || is_new;
     loop {
         if changed {
@@ -489,30 +495,98 @@ pub fn solve_system<L: Lane>(
     }
     for (i, row) in systems.nodes[systems.nodes_of(system)].iter().enumerate() {
         let Vec3 { x, y, z } = factors.nodes[i].right;
+        let held = held_rows(systems, system, row, &factors);
         for (at, change) in [x, y, z].into_iter().enumerate() {
-            if row.has_row(at) {
+            if row.is_limit(at) {
+                // A limit that was let go loses its impulse.
+                rows.change(i, at, L::select(rows.lacking(i, at), change, held[at].gt(L::constant(0.0))));
+            } else if row.has_row(at) {
                 rows.change(i, at, change);
             }
         }
     }
 }
 
-/// Removes from a system the limits that hold but have no impulse, or would pull after the changes found. Returns
-/// whether there were any. In a new system, all limits hold.
+/// The factors of the pivots of a node: above 0 for each row that takes part.
+#[inline(always)]
+fn held_rows<L: Lane>(systems: &JointSystems, system: usize, row: &NodeRow, factors: &SystemFactors<L>) -> [L; 3] {
+    let first_block = systems.blocks_of_system(system).start;
+    let Vec3 { x, y, z } = factors.lower[row.first_block as usize - first_block].diagonal();
+    [x, y, z]
+}
+
+/// Leaves limits that do not hold as sweeps left them.
+#[inline(always)]
+fn leave_out_free<L: Lane>(
+    systems: &JointSystems,
+    system: usize,
+    rows: &mut impl SystemRows<L>,
+    factors: &SystemFactors<L>,
+) {
+    let zero = L::constant(0.0);
+    for (node, row) in systems.nodes[systems.nodes_of(system)].iter().enumerate().filter(|(_, row)| row.has_limits()) {
+        let held = held_rows(systems, system, row, factors);
+        for i in (0..3).filter(|&i| row.is_limit(i)) {
+            rows.set_lacking(node, i, L::select(zero, rows.lacking(node, i), held[i].gt(zero)));
+        }
+    }
+}
+
+/// Takes the impulse `before` of a limit back, where the mask holds: adds the velocities that other rows lose by that to
+/// those that they lack.
+#[inline(always)]
+fn take_back<L: Lane>(
+    systems: &JointSystems,
+    system: usize,
+    (node, i): (usize, usize),
+    (before, mask): (L, L::Mask),
+    rows: &mut impl SystemRows<L>,
+    factors: &SystemFactors<L>,
+) {
+    let first_node = systems.nodes_of(system).start;
+    let mut add = |other: usize, coupled: [L; 3]| {
+        for (k, coupled) in coupled.into_iter().enumerate() {
+            if systems.nodes[first_node + other].has_row(k) && (other, k) != (node, i) {
+                let lacking = rows.lacking(other, k);
+                rows.set_lacking(other, k, L::select(lacking, lacking + coupled * before, mask));
+            }
+        }
+    };
+    for column in 0..factors.nodes.len() {
+        let blocks = systems.blocks_of(first_node + column);
+        for at in blocks.clone() {
+            let block = &systems.blocks[at];
+            let row = block.node as usize - first_node;
+            if column != node && row != node {
+                continue;
+            }
+            let shared = if at == blocks.start { OWN_SIDES } else { block.shared };
+            let coupling = factors.nodes[column].coupling(&factors.nodes[row], shared);
+            if column == node {
+                let Vec3 { x, y, z } = coupling.column(i);
+                add(row, [x, y, z]);
+            } else {
+                add(column, [0, 1, 2].map(|k| coupling.0[k][i]));
+            }
+        }
+    }
+}
+
+/// Removes from a system the limits that hold but have no impulse, or would pull after the changes found. A limit that
+/// would pull loses its impulse: what it kept would push without need. Returns whether there were any. In a new system,
+/// all limits hold.
 #[inline(always)]
 fn let_go<L: Lane>(
     systems: &JointSystems,
     system: usize,
     is_new: bool,
-    rows: &impl SystemRows<L>,
+    rows: &mut impl SystemRows<L>,
     factors: &mut SystemFactors<L>,
 ) -> bool {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let first_block = systems.blocks_of_system(system).start;
     let mut any = false;
     for (node, row) in systems.nodes[systems.nodes_of(system)].iter().enumerate().filter(|(_, row)| row.has_limits()) {
-        let Vec3 { x, y, z } = factors.lower[row.first_block as usize - first_block].diagonal();
-        let held = [x, y, z];
+        let held = held_rows(systems, system, row, factors);
         let Vec3 { x, y, z } = factors.nodes[node].right;
         let changes = [x, y, z];
         for i in 0..3 {
@@ -524,6 +598,11 @@ fn let_go<L: Lane>(
             let holds = if is_new { L::mask(true) } else { held[i].gt(zero) };
             let lets_go = L::select(L::select(zero, one, holds), zero, still_pushes).gt(zero);
             if L::any(lets_go) {
+                let pushed = L::and(lets_go, larger(before, -before).gt(zero));
+                if L::any(pushed) {
+                    take_back(systems, system, (node, i), (before, pushed), rows, factors);
+                }
+                rows.set_lacking(node, i, L::select(rows.lacking(node, i), -before, lets_go));
                 factors.nodes[node].remove(i, lets_go);
                 any = true;
             }

@@ -334,6 +334,11 @@ impl SystemRows<f32> for Alone<'_, '_> {
     }
 
     #[inline(always)]
+    fn set_lacking(&mut self, node: usize, row: usize, lacking: f32) {
+        *self.work.number(&self.work.changes, self.node(node), row) = lacking;
+    }
+
+    #[inline(always)]
     fn change(&mut self, node: usize, row: usize, change: f32) {
         *self.work.number(&self.work.changes, self.node(node), row) = change;
         *self.work.number(&self.work.impulses, self.node(node), row) += change;
@@ -418,6 +423,14 @@ impl<L: Lanes> SystemRows<L> for SideBySide<'_, '_> {
     #[inline(always)]
     fn lacking(&self, node: usize, row: usize) -> L {
         self.numbers(&self.work.changes, node, row)
+    }
+
+    #[inline(always)]
+    fn set_lacking(&mut self, node: usize, row: usize, lacking: L) {
+        let lacking = lacking.store();
+        for lane in 0..self.group.count {
+            *self.work.number(&self.work.changes, self.first_nodes[lane] + node, row) = lacking.0[lane];
+        }
     }
 
     #[inline(always)]

@@ -325,6 +325,11 @@ impl<S: Scalar> SystemRows<S> for OneSystem<'_, S> {
         component_of(&self.reference.joint_changes, self.number(node, row))
     }
 
+    fn set_lacking(&mut self, node: usize, row: usize, lacking: S) {
+        let at = self.number(node, row);
+        *component(&mut self.reference.joint_changes, at) = lacking;
+    }
+
     fn change(&mut self, node: usize, row: usize, change: S) {
         let at = self.number(node, row);
         *component(&mut self.reference.joint_changes, at) = change;
