@@ -115,11 +115,10 @@ pub(super) fn add_work_of_drives(
             let speeds = motions.each_ref().map(|(pair, motion)| axis_speed(Rules::default(), pair, motion));
             if axis.impulse_scale > 0.0 {
                 let masses = motions.each_ref().map(|(pair, motion)| axis_inverse_mass(pair, motion).recip());
-                let (mass, h) = (0.5 * (masses[0] + masses[1]), substep(body as usize));
+                let h = substep(body as usize);
                 // Positions at the times of the velocities.
-                let held =
-                    |i: usize| held_by_drive(&axis, axis.gap + motions[i].1.moved - 0.5 * h * speeds[i], mass, h);
-                work += held(0) - held(1);
+                let places = [0, 1].map(|i| axis.gap + motions[i].1.moved - 0.5 * h * speeds[i]);
+                work += given_by_drive(&axis, places, masses, h);
             } else {
                 let impulse = axis_impulse(problem, k, &problem.joint_totals);
                 work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);
@@ -129,11 +128,18 @@ pub(super) fn add_work_of_drives(
     }
 }
 
-/// Energy of a spring of the caller at a deflection, if its axis moves this mass, with the limit on its force (J).
-fn held_by_drive(axis: &Axis<f64>, deflection: f64, mass: f64, substep: f64) -> f64 {
-    let (stiffness, most) = (mass * axis.rate / (axis.impulse_scale * substep), axis.max_impulse / substep);
-    let reach = deflection.abs().min(most / stiffness);
-    stiffness * reach * (deflection.abs() - 0.5 * reach)
+/// The energy that a spring of the caller gives back between two deflections (J). `masses` are those that its axis moves
+/// there. The stiffness k follows the mass: if both it and the deflection x change steadily, the work differs from
+/// that of the mean stiffness by Δk Δx²/12, and if they do not, by at most Δk Δ(x²)/4 more.
+fn given_by_drive(axis: &Axis<f64>, deflections: [f64; 2], masses: [f64; 2], substep: f64) -> f64 {
+    let most = axis.max_impulse / substep;
+    let stiffness = masses.map(|mass| mass * axis.rate / (axis.impulse_scale * substep));
+    let mean = 0.5 * (stiffness[0] + stiffness[1]);
+    let free = deflections.map(|deflection| deflection.abs().min(most / mean));
+    let held = [0, 1].map(|i| mean * free[i] * (deflections[i].abs() - 0.5 * free[i]));
+    let [squares, moved] =
+        [free[1].powi(2) - free[0].powi(2), (deflections[1] - deflections[0]).abs().min(most / mean)];
+    held[0] - held[1] + (stiffness[1] - stiffness[0]).abs() * (0.25 * squares.abs() + moved * moved / 12.0)
 }
 
 fn axes_of(joint: &JointRow) -> std::ops::Range<usize> {

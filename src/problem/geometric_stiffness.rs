@@ -28,9 +28,9 @@ fn stiffness_inertia(r: Vec3, impulse: Vec3, h: f32) -> DMat3 {
     (DMat3::IDENTITY - along) * (tension * f64::from(h))
 }
 
-/// Adds stiffness inertia to the bodies of joints that are solved directly, and the rows that turn it with the bodies.
-/// `joints` has the joints that take part, each with the length of its substeps (s). `added` is memory that steps
-/// reuse.
+/// Adds stiffness inertia to the bodies of joints that are solved directly, and the rows that turn the inertia of bodies
+/// with joints. `joints` has the joints that take part, each with the length of its substeps (s), or 0 if it is swept.
+/// `added` is memory that steps reuse.
 pub(super) fn add_stiffness_inertia(
     joints: impl Iterator<Item = (usize, f32)>,
     added: &mut Vec<StiffnessInertia>,
@@ -39,6 +39,11 @@ pub(super) fn add_stiffness_inertia(
     for (i, h) in joints {
         let (row, impulse) = (&problem.joints[i], problem.joint_impulse(&problem.joint_impulses, i));
         for (body, arm, sign) in [(row.body_a, row.r_a, -1.0), (row.body_b, row.r_b, 1.0)] {
+            // An inertia that is equal about all axes stays as it is.
+            let is_world = body as usize >= problem.masses.len();
+            if h == 0.0 && (is_world || problem.is_isotropic(&[body])) {
+                continue;
+            }
             added.push((body, stiffness_inertia(Vec3::from_array(arm), impulse * sign, h)));
         }
     }

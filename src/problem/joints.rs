@@ -14,7 +14,7 @@ use crate::config::{JointSolver, SolverConfig};
 use crate::effort::{self, Effort, Interface, JointNeed};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
-use crate::world::{BodyKind, Joint, JointHandle, World};
+use crate::world::{Body, BodyKind, Bounds, Joint, JointHandle, Linear, World};
 
 /// The joints that have rows, and their colors.
 #[derive(Debug, Default)]
@@ -42,6 +42,8 @@ pub struct JointRows {
     left: Vec<LeftToSweeps>,
     /// The factor from ω² of turning arms to the gap that they open, relative to the promised gap (s²).
     gap_of_turns: f32,
+    /// The length of a step (s).
+    step: f32,
     /// Stiffness inertia of bodies, in memory that steps reuse.
     stiffness_inertias: Vec<StiffnessInertia>,
 }
@@ -58,7 +60,7 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     left,
-} scratch { graph, sums, gap_of_turns, stiffness_inertias });
+} scratch { graph, sums, gap_of_turns, step, stiffness_inertias });
 
 /// The factor by which a joint of a swinging net may open further in the next step.
 const GROWTH: f32 = 2.5;
@@ -147,6 +149,7 @@ impl JointRows {
     /// `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
         self.gap_of_turns = 0.5 * substep * substep / config.max_joint_gap_share;
+        self.step = substep * config.substeps as f32;
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
             let ends = self.joints.iter().map(Joint::indices);
@@ -299,21 +302,52 @@ impl JointRows {
             || (0..self.joints.len()).any(|joint| self.need_of_turns(world, joint) > 1.0)
     }
 
-    /// The gap that turning arms would open in a joint in class 0, over the promised gap. Arms turn, but centers of
-    /// mass move straight on. In a substep h this opens a direct joint by (h ω)²/2 of an arm.
+    /// The gap that motion at constant velocities would open in a joint in class 0, over the promised gap. Arms and axes
+    /// turn, but centers of mass move straight on. In a substep h this opens a direct joint by h²/2 times the
+    /// acceleration of its coordinates: ω² of an arm, 2 ω u where body a slides at u along axes that turn at ω, and u²/d
+    /// where u is across a distance d.
     fn need_of_turns(&self, world: &World, joint: usize) -> f32 {
         // The springs of swept joints would change their stiffness as bodies turn.
         if self.systems.get(joint).is_none_or(|&system| system == SWEPT) {
             return 0.0;
         }
-        let Joint { body_a, anchor_a, body_b, anchor_b, .. } = self.joints[joint];
-        let (mut arms, mut opened) = (0.0, 0.0);
-        for (body, anchor) in [(Some(body_a), anchor_a), (body_b, anchor_b)] {
-            if let Some(body) = body.and_then(|body| world.body(body)) {
-                let arm = anchor.distance(body.mass.center);
-                (arms, opened) = (arms + arm, opened + arm * body.angular_velocity.length_squared());
+        let joint = &self.joints[joint];
+        let [at_a, at_b] = world.anchors(joint);
+        let [a, b] = [world.body(joint.body_a), joint.body_b.and_then(|b| world.body(b))];
+        let turns = |body: Option<&Body>, at: Vec3| {
+            body.map_or((0.0, 0.0), |body| (at.distance(body.center_of_mass()), body.angular_velocity.length()))
+        };
+        let velocity = |body: Option<&Body>, at: Vec3| body.map_or(Vec3::ZERO, |body| body.velocity_at(at));
+        // The end of the arm of b, the length of a rod or rope, and the acceleration of the coordinates besides that of
+        // the arms.
+        let (end_b, length, moved) = match &joint.linear {
+            Linear::Distance(distance) => {
+                let apart = at_a - at_b;
+                let (length, along) = (apart.length(), apart.normalize_or_zero());
+                let u = velocity(a, at_a) - velocity(b, at_b);
+                let next = length + self.step * along.dot(u);
+                let is_reached = match distance.bounds {
+                    Bounds::Free => false,
+                    Bounds::Locked => true,
+                    Bounds::Between { min, max } => length.max(next) >= max || length.min(next) <= min && min > 0.0,
+                };
+                // A rope that the step does not tighten opens nothing.
+                if !is_reached {
+                    return 0.0;
+                }
+                let across = (u - along * along.dot(u)).length_squared();
+                (at_b, length, if length > 0.0 { across / length } else { 0.0 })
             }
-        }
+            Linear::Axes(_) if joint.holds_anchors() => (at_b, 0.0, 0.0),
+            Linear::Axes(axes) if axes.iter().all(|axis| axis.bounds == Bounds::Free) => return 0.0,
+            Linear::Axes(_) => {
+                let u = velocity(a, at_a) - velocity(b, at_a);
+                (at_a, 0.0, 2.0 * turns(b, at_a).1 * u.length())
+            }
+        };
+        let [(arm_a, spin_a), (arm_b, spin_b)] = [turns(a, at_a), turns(b, end_b)];
+        let arms = arm_a + arm_b + length;
+        let opened = arm_a * spin_a * spin_a + arm_b * spin_b * spin_b + moved;
         if arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 }
     }
 
@@ -409,10 +443,11 @@ impl JointRows {
             // A joint that does not take part has no load that could break it.
             problem.joint_totals.resize(problem.joint_impulses.len(), JointImpulseRow::default());
         }
-        let is_direct = |joint: usize| self.systems[joint] != SWEPT && takes_part(world, asleep, joint as u32);
-        let direct = (0..world.joints.len()).filter(|&joint| is_direct(joint));
+        // The inertia of every body with joints turns, so that their impulses conserve angular momentum.
+        let taking_part = (0..world.joints.len()).filter(|&joint| takes_part(world, asleep, joint as u32));
+        let of_direct = |joint: usize| if self.systems[joint] == SWEPT { 0.0 } else { substep * self.shares[joint] };
         add_stiffness_inertia(
-            direct.map(|joint| (joint, substep * self.shares[joint])),
+            taking_part.map(|joint| (joint, of_direct(joint))),
             &mut self.stiffness_inertias,
             problem,
         );

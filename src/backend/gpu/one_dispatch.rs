@@ -84,7 +84,8 @@ fn needs_many_buffers(problem: &StepProblem, passes: &[Pass]) -> bool {
     let joints = if problem.joints.is_empty() { 0 } else { 2 + usize::from(!problem.axes.is_empty()) };
     let colors = usize::from(contacts + joints > 0);
     let totals = [!problem.totals.is_empty(), !problem.joint_totals.is_empty()].map(usize::from);
-    let of_bodies = [problem.torques.is_empty(), problem.dampings.is_empty(), problem.inertias.is_empty()];
+    let turning = problem.turning.is_empty();
+    let of_bodies = [problem.torques.is_empty(), problem.dampings.is_empty(), problem.inertias.is_empty(), turning];
     let of_bodies = of_bodies.map(|is_empty| usize::from(!is_empty));
     let all = [3, contacts, joints, colors, usize::from(measured)];
     all.iter().chain(&totals).chain(&of_bodies).sum::<usize>() > 8
