@@ -103,44 +103,44 @@ fn a_wheel_inside_of_its_chassis_stays_slow() {
 }
 
 /// The change of the angular momentum of two joined bodies about the origin in two seconds, over that of the start, and the energy that
-/// the law took, over that of the start.
-fn drift_of_a_pair(joint: impl Fn(Joint) -> Joint, spin: Vec3, substeps: u32) -> [f64; 2] {
+/// the law took, over that of the start; the largest gap of their joint (m).
+fn drift_of_a_pair(light: Body, joint: impl Fn(Joint) -> Joint, spin: Vec3, substeps: u32) -> [f64; 3] {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    let (heavy, light) = (Vec3::ZERO, Vec3::new(0.9, 0.2, -0.4));
-    let box_of = |half: [f32; 3], at: Vec3| {
-        Body::dynamic().shape(Shape::cuboid(half[0], half[1], half[2])).position(at.x, at.y, at.z)
-    };
-    let a = world.insert(box_of([0.3, 0.15, 0.1], heavy).velocity(spin.cross(heavy), spin));
-    let b = world.insert(box_of([0.1, 0.1, 0.2], light).velocity(spin.cross(light), spin));
+    let heavy = Body::dynamic().shape(Shape::cuboid(0.3, 0.15, 0.1)).velocity(Vec3::ZERO, spin);
+    let at = Vec3::new(0.9, 0.2, -0.4);
+    let light = light.position(at.x, at.y, at.z).velocity(spin.cross(at), spin);
+    let [a, b] = [heavy, light].map(|body| world.insert(body));
     world.insert_joint(joint(Joint::new(b, Vec3::new(-0.7, -0.1, 0.2), a, Vec3::new(0.2, 0.1, -0.2))));
     let mut config = SolverConfig::default().without_sleep();
     config.substeps = substeps;
     let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world");
     let (first, energy) = (simulation.world.angular_momentum(), simulation.world.kinetic_energy());
-    let (mut drift, mut taken) = (0.0_f64, 0.0);
+    let (mut drift, mut taken, mut gap) = (0.0_f64, 0.0, 0.0_f32);
     for _ in 0..120 {
         taken += simulation.step(DT).expect("a step").energy_taken;
         drift = drift.max((simulation.world.angular_momentum() - first).length() / first.length());
+        gap = gap.max(simulation.world.joint_gap());
     }
-    [drift, taken / energy]
+    [drift, taken / energy, gap.into()]
 }
 
-/// A slider that moves out by itself and meets its end. A limit that kept its impulse after it would pull had pushed on, and what the law
-/// took of its energy took angular momentum as well.
+/// A ball slides out on a lever sixteen times as long as itself, and meets its end. A limit that kept its impulse after it would pull had
+/// pushed on: the law took 1 to 25 % of the energy, and with it up to 3 % of the angular momentum.
 #[test]
 fn a_slider_that_meets_its_end_makes_no_energy_and_keeps_its_angular_momentum() {
-    for spin in
-        [Vec3::new(0.3, 4.0, 1.0), Vec3::new(-2.0, 1.0, 3.0), Vec3::new(0.0, -1.0, 5.0), Vec3::new(3.0, 2.0, -2.0)]
-    {
+    let spins =
+        [Vec3::new(0.3, 4.0, 1.0), Vec3::new(-2.0, 1.0, 3.0), Vec3::new(0.0, -1.0, 5.0), Vec3::new(3.0, 2.0, -2.0)];
+    for spin in spins {
         let slider = |joint: Joint| {
-            let along = Axis::limited(-0.02, 0.03);
+            let along = Axis::limited(-0.05, 0.2);
             joint.generic([along, Axis::LOCKED, Axis::LOCKED], [Axis::LOCKED; 3])
         };
-        let [drift, taken] = drift_of_a_pair(slider, spin, 8);
+        let ball = Body::dynamic().shape(Shape::ball(0.06)).density(8000.0);
+        let [drift, taken, gap] = drift_of_a_pair(ball, slider, spin, 8);
         assert!(
-            drift < 1e-3 && taken < 1e-4,
-            "{spin}: angular momentum drifts by {drift:.1e}, the law took {taken:.1e}"
+            drift < 6e-3 && taken < 1e-4 && gap < 2e-4,
+            "{spin}: angular momentum drifts by {drift:.1e}, the law took {taken:.1e}, it opens by {gap:.1e} m"
         );
     }
 }
@@ -150,11 +150,12 @@ fn a_slider_that_meets_its_end_makes_no_energy_and_keeps_its_angular_momentum() 
 #[test]
 fn a_spring_beside_centers_of_mass_keeps_energy_and_angular_momentum() {
     for spin in [Vec3::new(0.3, 4.0, 1.0), Vec3::new(-2.0, 1.0, 3.0), Vec3::new(3.0, 2.0, -2.0)] {
+        let light = Body::dynamic().shape(Shape::cuboid(0.1, 0.1, 0.2));
         let spring = |joint: Joint| {
             let apart = Vec3::new(0.4, -0.4, 0.2);
             Joint { anchor_a: joint.anchor_a + apart, ..joint }.elastic(apart.length(), 4.0, 0.0)
         };
-        let [drift, taken] = drift_of_a_pair(spring, spin, 32);
+        let [drift, taken, _] = drift_of_a_pair(light, spring, spin, 32);
         assert!(
             drift < 4e-3 && taken < 0.01,
             "{spin}: angular momentum drifts by {drift:.1e}, the law took {taken:.1e}"
