@@ -56,17 +56,14 @@ fn leave_out_row(first_axis: u32, rows: u32, i: u32, held: bool) {
     joint_changes[first_axis + axis_of_row(rows, i) - 1u].linear.x = 0.0;
 }
 
-fn leave_out_free(system: u32) {
-    let end = begin_of_system(system + 1u);
-    for (var node = begin_of_system(system); node < end; node++) {
-        let rows = rows_of_node(node);
-        if rows == ANCHORS { continue; }
-        let first = params.joint_count + joints[joint_of_node(node)].first_axis;
-        let held = diagonal_of(joint_blocks[first_block_of_node(node)].lower);
-        leave_out_row(first, rows, 0u, held.x > 0.0);
-        leave_out_row(first, rows, 1u, held.y > 0.0);
-        leave_out_row(first, rows, 2u, held.z > 0.0);
-    }
+fn leave_out_free(node: u32) {
+    let rows = rows_of_node(node);
+    if rows == ANCHORS { return; }
+    let first = params.joint_count + joints[joint_of_node(node)].first_axis;
+    let held = diagonal_of(joint_blocks[first_block_of_node(node)].lower);
+    leave_out_row(first, rows, 0u, held.x > 0.0);
+    leave_out_row(first, rows, 1u, held.y > 0.0);
+    leave_out_row(first, rows, 2u, held.z > 0.0);
 }
 
 // Adds a velocity to the one that row i of a node lacks, unless it is the row that is taken back.
@@ -201,9 +198,11 @@ fn solve_system(rules: Rules, system: u32) {
     let first = begin_of_system(system);
     let end = begin_of_system(system + 1u);
     // Sweeps may have let go of limits since the system was factored.
-    for (var node = first; node < end; node++) { joint_nodes[node].right = vec3f(0.0); }
     let is_new = 0.0 > joint_nodes[first].softness;
-    if !is_new { leave_out_free(system); }
+    for (var node = first; node < end; node++) {
+        joint_nodes[node].right = vec3f(0.0);
+        if !is_new { leave_out_free(node); }
+    }
     var changed = let_go(system, is_new) || is_new;
     loop {
         if changed { factor_blocks(system); }

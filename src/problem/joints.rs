@@ -312,42 +312,43 @@ impl JointRows {
             return 0.0;
         }
         let joint = &self.joints[joint];
-        let [at_a, at_b] = world.anchors(joint);
-        let [a, b] = [world.body(joint.body_a), joint.body_b.and_then(|b| world.body(b))];
-        let turns = |body: Option<&Body>, at: Vec3| {
-            body.map_or((0.0, 0.0), |body| (at.distance(body.center_of_mass()), body.angular_velocity.length()))
-        };
-        let velocity = |body: Option<&Body>, at: Vec3| body.map_or(Vec3::ZERO, |body| body.velocity_at(at));
-        // The end of the arm of b, the length of a rod or rope, and the acceleration of the coordinates besides that of
-        // the arms.
-        let (end_b, length, moved) = match &joint.linear {
-            Linear::Distance(distance) => {
-                let apart = at_a - at_b;
-                let (length, along) = (apart.length(), apart.normalize_or_zero());
-                let u = velocity(a, at_a) - velocity(b, at_b);
-                let next = length + self.step * along.dot(u);
-                let is_reached = match distance.bounds {
-                    Bounds::Free => false,
-                    Bounds::Locked => true,
-                    Bounds::Between { min, max } => length.max(next) >= max || length.min(next) <= min && min > 0.0,
-                };
-                // A rope that the step does not tighten opens nothing.
-                if !is_reached {
-                    return 0.0;
+        let [a, b] = [Some(joint.body_a), joint.body_b].map(|body| body.and_then(|body| world.body(body)));
+        let arm = |body: Option<&Body>, anchor: Vec3| body.map_or(0.0, |body| anchor.distance(body.mass.center));
+        let spin = |body: Option<&Body>| body.map_or(Vec3::ZERO, |body| body.angular_velocity);
+        let (arm_a, mut arm_b) = (arm(a, joint.anchor_a), arm(b, joint.anchor_b));
+        // The length of a rod or rope, and the acceleration of the coordinates besides that of the arms.
+        let (mut length, mut moved) = (0.0, 0.0);
+        if !joint.holds_anchors() {
+            let [at_a, at_b] = world.anchors(joint);
+            let velocity = |body: Option<&Body>, at: Vec3| body.map_or(Vec3::ZERO, |body| body.velocity_at(at));
+            match &joint.linear {
+                Linear::Distance(distance) => {
+                    let apart = at_a - at_b;
+                    let along = apart.normalize_or_zero();
+                    length = apart.length();
+                    let u = velocity(a, at_a) - velocity(b, at_b);
+                    let next = length + self.step * along.dot(u);
+                    let is_reached = match distance.bounds {
+                        Bounds::Free => false,
+                        Bounds::Locked => true,
+                        Bounds::Between { min, max } => length.max(next) >= max || length.min(next) <= min && min > 0.0,
+                    };
+                    // A rope that the step does not tighten opens nothing.
+                    if !is_reached {
+                        return 0.0;
+                    }
+                    let across = (u - along * along.dot(u)).length_squared();
+                    moved = if length > 0.0 { across / length } else { 0.0 };
                 }
-                let across = (u - along * along.dot(u)).length_squared();
-                (at_b, length, if length > 0.0 { across / length } else { 0.0 })
+                Linear::Axes(axes) if axes.iter().all(|axis| axis.bounds == Bounds::Free) => return 0.0,
+                Linear::Axes(_) => {
+                    arm_b = b.map_or(0.0, |b| at_a.distance(b.center_of_mass()));
+                    moved = 2.0 * spin(b).length() * (velocity(a, at_a) - velocity(b, at_a)).length();
+                }
             }
-            Linear::Axes(_) if joint.holds_anchors() => (at_b, 0.0, 0.0),
-            Linear::Axes(axes) if axes.iter().all(|axis| axis.bounds == Bounds::Free) => return 0.0,
-            Linear::Axes(_) => {
-                let u = velocity(a, at_a) - velocity(b, at_a);
-                (at_a, 0.0, 2.0 * turns(b, at_a).1 * u.length())
-            }
-        };
-        let [(arm_a, spin_a), (arm_b, spin_b)] = [turns(a, at_a), turns(b, end_b)];
+        }
         let arms = arm_a + arm_b + length;
-        let opened = arm_a * spin_a * spin_a + arm_b * spin_b * spin_b + moved;
+        let opened = arm_a * spin(a).length_squared() + arm_b * spin(b).length_squared() + moved;
         if arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 }
     }
 

@@ -47,8 +47,8 @@ fn a_cube_bears_one_of_a_million_times_its_mass() {
     }
 }
 
-/// The substeps of two balls on a rod, or on a rope of this length, after a step in which they pass each other at a distance of 1 m, at this
-/// speed each.
+/// The substeps of two balls at a distance of 1 m on a rod or a rope, after two steps. They begin across it at this speed each, one this way
+/// and one that way.
 fn substeps_of_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> u32 {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
