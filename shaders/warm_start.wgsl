@@ -11,18 +11,20 @@ fn warm_start_contact(rules: Rules, i: u32) {
     for (var k = contact.first_point; k < end; k++) {
         let impulse = impulses[k];
         var p = contact.normal * impulse.normal;
-        if rules.friction != FRICTION_NONE && !rules.at_patch {
+        if rules.friction != FRICTION_NONE && !is_at_patch(rules) {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
         apply_impulse(rules.isotropic, &pair, points[k].r_a, points[k].r_b, p);
     }
-    if rules.friction != FRICTION_NONE && rules.at_patch {
+    if rules.friction != FRICTION_NONE && rules.has_patch {
         let impulse = impulses[end];
         let twist = contact.normal * impulse.normal;
-        pair.a.w -= spin_of(rules.isotropic, pair.mass_a, twist);
-        pair.b.w += spin_of(rules.isotropic, pair.mass_b, twist);
         let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-        apply_impulse(rules.isotropic, &pair, points[end].r_a, points[end].r_b, p);
+        var turn = twist;
+        if rules.rolls { turn = twist + p; }
+        pair.a.w -= spin_of(rules.isotropic, pair.mass_a, turn);
+        pair.b.w += spin_of(rules.isotropic, pair.mass_b, turn);
+        if !rules.rolls { apply_impulse(rules.isotropic, &pair, points[end].r_a, points[end].r_b, p); }
     }
     store_pair(contact.body_a, contact.body_b, &pair);
 }

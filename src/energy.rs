@@ -274,7 +274,7 @@ impl Energy {
             all.for_each(|(kept, entry)| *kept = Kept { made: kept.made, ..Kept::of(entry, entry.left()) });
             return Taken::default();
         }
-        self.join(problem);
+        self.join(world, problem);
         self.add_up(world, problem, effort);
         let mut taken = Taken::default();
         if self.accounts.iter().any(Account::is_over) {
@@ -312,7 +312,7 @@ impl Energy {
     }
 
     /// Finds the islands of bodies that contacts and joints connect.
-    fn join(&mut self, problem: &StepProblem) {
+    fn join(&mut self, world: &World, problem: &StepProblem) {
         let joints = problem.rows_of(&problem.joint_colors());
         if self.are_known && joints.is_empty() {
             return;
@@ -349,7 +349,8 @@ impl Energy {
             } else {
                 numbers[body] = numbers[root as usize];
             }
-            accounts[numbers[body] as usize].is_held |= state == HELD;
+            // What locks the axes of a body holds it.
+            accounts[numbers[body] as usize].is_held |= state == HELD || world.bodies[body].has_locked_axis();
         }
         self.are_known = joints.is_empty();
     }

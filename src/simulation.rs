@@ -29,7 +29,7 @@ use crate::stats::{StepStats, Stopwatch, timed};
 #[cfg(doc)]
 use crate::world::Body;
 use crate::world::{BodyHandle, JointHandle, World};
-use stages::{Changes, Stages};
+use stages::{Changes, Stages, check_materials};
 
 pub use contacts::{Contact, ContactPoint};
 pub use events::{ColliderOf, Event, Hit, Listen};
@@ -145,6 +145,7 @@ impl Simulation {
     pub fn with(mut world: World, config: SolverConfig, backend: Box<dyn Backend>) -> Result<Self> {
         config.check()?;
         world.check()?;
+        check_materials(&world, &config)?;
         world.raise_inertias();
         let stages = Stages::new(&world, &config);
         Ok(Self::between_steps(world, config, stages, backend))
@@ -610,6 +611,7 @@ impl Simulation {
     /// A setting is out of range or contradicts another. The settings are then unchanged.
     pub fn set_config(&mut self, config: SolverConfig) -> Result<()> {
         config.check()?;
+        check_materials(&self.world, &config)?;
         self.config = config;
         Ok(())
     }

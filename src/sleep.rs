@@ -341,6 +341,7 @@ impl Sleep {
     fn let_islands_sleep(&mut self, world: &mut World, detector: &Detector, config: &SolverConfig) {
         // Islands of awake bodies, the bodies that something holds, and the bodies that touch a driven body.
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
+        let has_belt = |i: usize| world.bodies[i].materials().any(|material| material.is_driven());
         let mut held = vec![false; self.asleep.len()];
         let mut driven = vec![false; self.asleep.len()];
         self.islands.reset(self.asleep.len());
@@ -348,7 +349,8 @@ impl Sleep {
             for (one, other) in [(Some(a), b), (b, Some(a))] {
                 let Some(one) = one else { continue };
                 held[one] = true;
-                driven[one] |= other.is_some_and(|other| self.activity[other] == Activity::Moving);
+                let moves = |other: usize| self.activity[other] == Activity::Moving || has_belt(other);
+                driven[one] |= has_belt(one) || other.is_some_and(moves);
             }
             if let Some(b) = b.filter(|&b| is_dynamic(a) && is_dynamic(b) && !self.asleep[a] && !self.asleep[b]) {
                 self.islands.join(a as u32, b as u32);

@@ -22,7 +22,7 @@ use crate::residuals::Residuals;
 /// ```
 ///
 /// # Errors
-/// Those of [`Simulation::step`]; or the world has joints or locked rotations, which a contact problem cannot have.
+/// Those of [`Simulation::step`]; or the world has joints or locked axes, which a contact problem cannot have.
 pub fn step_with_contacts(simulation: &mut Simulation, name: &str, dt: f32) -> Result<(ContactProblem, StepStats)> {
     check(simulation, name)?;
     let (problem, plan) = simulation.next_problem(dt)?;
@@ -70,10 +70,10 @@ fn check(simulation: &Simulation, name: &str) -> Result<()> {
         let joints = world.joints.len();
         return Err(Error::input(format!("{name} has {joints} joints: a contact problem cannot have joints")));
     }
-    if let Some(i) = world.bodies.iter().position(Body::has_locked_rotation) {
+    if let Some(i) = world.bodies.iter().position(Body::has_locked_axis) {
         let name = &world.bodies[i].name;
         return Err(Error::input(format!(
-            "body {i} {name:?} has locked rotations: a contact problem cannot have locked rotations"
+            "body {i} {name:?} has locked axes: a contact problem cannot have locked axes"
         )));
     }
     Ok(())

@@ -145,7 +145,8 @@ class Body:
         return self._set("angular_damping", _check.number("angular", angular))
 
     def set(self, **keys: Any) -> Self:
-        """Set other keys of scene files, such as `locked_rotations`, `can_sleep`, `swept` or `mass_properties`.
+        """Set other keys of scene files, such as `locked_rotations`, `surface_velocity`, `rolling_friction`, `swept`
+        or `mass_properties`.
 
         >>> import drystone as ds
         >>> ds.Body.dynamic().ball(0.5).set(locked_rotations=[True, False, True]).to_dict()["locked_rotations"]

@@ -55,3 +55,25 @@ fn solve_twist(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_
     (*pair).a.w -= spin_of(rules.isotropic, (*pair).mass_a, change);
     (*pair).b.w += spin_of(rules.isotropic, (*pair).mass_b, change);
 }
+
+// Friction against the relative spin of two bodies, at the patch of a manifold whose normal impulses add up to
+// `pressed`. `slip_1` of the patch is the lever of friction against spin about the normal, `slip_2` that against rolling.
+fn solve_rolling(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_point: Point, pressed: f32, impulse: ptr<function, Impulse>) {
+    let tangent_2 = cross3(contact.normal, contact.tangent);
+    var w = (*pair).b.w - (*pair).a.w;
+    if rules.from_start { w = w + ((*pair).start_b.w - (*pair).start_a.w); }
+    let masses = params.relaxation * vec2f(patch_point.normal_mass, patch_point.tangent_mass);
+    let spun = clamp_abs((*impulse).normal - masses.x * dot3(w, contact.normal), patch_point.slip_1 * pressed);
+    let rolled = allowed_friction(
+        FRICTION_DISC,
+        vec2f((*impulse).tangent_1 - masses.y * dot3(w, contact.tangent), (*impulse).tangent_2 - masses.y * dot3(w, tangent_2)),
+        patch_point.slip_2 * pressed,
+    );
+    let turn = contact.normal * (spun - (*impulse).normal)
+        + (contact.tangent * (rolled.x - (*impulse).tangent_1) + tangent_2 * (rolled.y - (*impulse).tangent_2));
+    (*impulse).normal = spun;
+    (*impulse).tangent_1 = rolled.x;
+    (*impulse).tangent_2 = rolled.y;
+    (*pair).a.w -= spin_of(rules.isotropic, (*pair).mass_a, turn);
+    (*pair).b.w += spin_of(rules.isotropic, (*pair).mass_b, turn);
+}

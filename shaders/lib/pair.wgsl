@@ -38,14 +38,23 @@ fn load_pair(a: u32, b: u32) -> Pair {
     return Pair(bodies[a], bodies[b], masses[a], masses[b], load_start(masses[a], a), load_start(masses[b], b));
 }
 
-// An immovable body is never written, because no color protects it.
+// A vector without its components along locked axes.
+fn unlocked(m: Mass, v: vec3f) -> vec3f {
+    let z = m.locks > 3.5;
+    let rest = m.locks - select(0.0, 4.0, z);
+    let y = rest > 1.5;
+    let x = rest - select(0.0, 2.0, y) > 0.5;
+    return vec3f(select(v.x, 0.0, x), select(v.y, 0.0, y), select(v.z, 0.0, z));
+}
+
+// An immovable body is never written, because no color protects it. One with locked axes does not move along them.
 fn store_pair(a: u32, b: u32, pair: ptr<function, Pair>) {
     if (*pair).mass_a.inv_mass > 0.0 {
-        bodies[a].v = (*pair).a.v;
+        bodies[a].v = unlocked((*pair).mass_a, (*pair).a.v);
         bodies[a].w = (*pair).a.w;
     }
     if (*pair).mass_b.inv_mass > 0.0 {
-        bodies[b].v = (*pair).b.v;
+        bodies[b].v = unlocked((*pair).mass_b, (*pair).b.v);
         bodies[b].w = (*pair).b.w;
     }
 }

@@ -20,7 +20,7 @@ fn sweep_normals(rules: Rules, pair: ptr<function, Pair>, contact: Contact, held
 
 fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, held: ptr<function, Held>) {
     let end = contact.first_point + contact.point_count;
-    if rules.at_patch {
+    if is_at_patch(rules) {
         var pressed = 0.0;
         var lever = 0.0;
         for (var k = contact.first_point; k < end; k++) {
@@ -37,5 +37,12 @@ fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, hel
             solve_friction(rules, pair, contact, points[k], impulse.normal, &impulse);
             impulses[k] = impulse;
         }
+    }
+    if rules.rolls {
+        var all = 0.0;
+        for (var k = contact.first_point; k < end; k++) { all += impulses[k].normal; }
+        var impulse = impulses[end];
+        solve_rolling(rules, pair, contact, points[end], all, &impulse);
+        impulses[end] = impulse;
     }
 }

@@ -7,7 +7,7 @@ struct Held { points: array<Point, 5>, impulses: array<Impulse, 5> }
 
 fn load_points(rules: Rules, contact: Contact) -> Held {
     let first = contact.first_point;
-    let last = first + contact.point_count - select(1u, 0u, rules.at_patch);
+    let last = first + contact.point_count - select(1u, 0u, rules.has_patch);
     let at = min(vec4u(first + 1u, first + 2u, first + 3u, first + 4u), vec4u(last));
     return Held(
         array<Point, 5>(points[first], points[at.x], points[at.y], points[at.z], points[at.w]),
@@ -17,7 +17,7 @@ fn load_points(rules: Rules, contact: Contact) -> Held {
 
 fn store_points(rules: Rules, contact: Contact, held: ptr<function, Held>) {
     let first = contact.first_point;
-    let count = contact.point_count + select(0u, 1u, rules.at_patch);
+    let count = contact.point_count + select(0u, 1u, rules.has_patch);
     impulses[first] = (*held).impulses[0];
     if count > 1u { impulses[first + 1u] = (*held).impulses[1]; }
     if count > 2u { impulses[first + 2u] = (*held).impulses[2]; }
@@ -58,6 +58,12 @@ fn patch_friction_at(k: u32, rules: Rules, pair: ptr<function, Pair>, contact: C
     (*held).impulses[k] = impulse;
 }
 
+fn rolling_at(k: u32, rules: Rules, pair: ptr<function, Pair>, contact: Contact, held: ptr<function, Held>, pressed: f32) {
+    var impulse = (*held).impulses[k];
+    solve_rolling(rules, pair, contact, (*held).points[k], pressed, &impulse);
+    (*held).impulses[k] = impulse;
+}
+
 // The normal impulse of a point, and its product with the distance from the middle of the patch.
 fn pressed_at(k: u32, held: ptr<function, Held>) -> vec2f {
     let normal = (*held).impulses[k].normal;
@@ -66,7 +72,7 @@ fn pressed_at(k: u32, held: ptr<function, Held>) -> vec2f {
 
 fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, held: ptr<function, Held>) {
     let count = contact.point_count;
-    if rules.at_patch {
+    if is_at_patch(rules) {
         var pressed = vec2f() + pressed_at(0u, held);
         if count > 1u { pressed += pressed_at(1u, held); }
         if count > 2u { pressed += pressed_at(2u, held); }
@@ -80,5 +86,15 @@ fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, hel
         if count > 1u { friction_at(1u, rules, pair, contact, held); }
         if count > 2u { friction_at(2u, rules, pair, contact, held); }
         if count > 3u { friction_at(3u, rules, pair, contact, held); }
+    }
+    if rules.rolls {
+        var pressed = 0.0 + (*held).impulses[0].normal;
+        if count > 1u { pressed += (*held).impulses[1].normal; }
+        if count > 2u { pressed += (*held).impulses[2].normal; }
+        if count > 3u { pressed += (*held).impulses[3].normal; }
+        if count == 1u { rolling_at(1u, rules, pair, contact, held, pressed); }
+        if count == 2u { rolling_at(2u, rules, pair, contact, held, pressed); }
+        if count == 3u { rolling_at(3u, rules, pair, contact, held, pressed); }
+        if count == 4u { rolling_at(4u, rules, pair, contact, held, pressed); }
     }
 }

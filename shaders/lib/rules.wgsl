@@ -4,8 +4,10 @@
 struct Rules {
     biased: bool,
     friction: u32,
-    // Friction acts at the patch of a manifold instead of at its points.
-    at_patch: bool,
+    // A row for the whole manifold, the patch, follows the rows of its points. Friction acts there, unless it `rolls`.
+    has_patch: bool,
+    // The patch resists rolling and spinning, and friction acts at the points.
+    rolls: bool,
     friction_first: bool,
     accumulated: bool,
     round: bool,
@@ -21,6 +23,9 @@ struct Rules {
     // Points keep the largest normal impulse of the step.
     bounces: bool,
 }
+
+// Whether friction acts once for each manifold, at its patch.
+fn is_at_patch(rules: Rules) -> bool { return rules.has_patch && !rules.rolls; }
 
 const FRICTION_NONE: u32 = 0u;
 const FRICTION_SLIP: u32 = 1u;

@@ -7,7 +7,7 @@ struct Free { v: vec3f, w: vec3f }
 
 struct Mass {
     inv_inertia_x: vec3f, inv_mass: f32,
-    inv_inertia_yz: vec3f, pad_inertia: f32,
+    inv_inertia_yz: vec3f, locks: f32,
     acceleration: vec3f,
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::{Entry, can_move, ends};
+use super::{Entry, can_move, ends, moved_by};
 use crate::config::SolverConfig;
 use crate::kernels::Rules;
 use crate::kernels::axis::{axis_inverse_mass, axis_motion, axis_speed};
@@ -87,6 +87,11 @@ pub(super) fn add_work_of_drives(
                     entries[to as usize].work += work.max(0.0);
                 }
             }
+        }
+    }
+    if problem.params.driven != 0 {
+        for contact in problem.swept_contacts() {
+            entries[moved_by(problem, contact)].work += work_of_surfaces(contact, problem);
         }
     }
     for &row in problem.rows_of(&problem.joint_colors()) {
@@ -176,20 +181,30 @@ fn work_of_contact(driver: &Body, contact: &ContactRow, is_a: bool, problem: &St
     let normal = Vec3::from(contact.normal);
     let first = contact.first_point as usize;
     let points = first..first + contact.point_count as usize;
-    let patch = problem.has_patches().then_some(points.end);
+    let (patch, rolls) = (problem.has_patches().then_some(points.end), problem.params.rolls != 0);
     let mut work = 0.0;
     for k in points.chain(patch) {
         let (total, point) = (&problem.totals[k], &problem.points[k]);
         let arm = Vec3::from(if is_a { point.r_a } else { point.r_b });
         let velocity = driver.linear_velocity + driver.angular_velocity.cross(arm);
         let slip = t_1 * total.tangent_1 + t_2 * total.tangent_2;
-        // The normal impulse of a patch is the impulse of its twist.
+        // The normal impulse of a patch is that of its twist, and with rolling friction all are angular.
         work += f64::from(match Some(k) == patch {
+            true if rolls => driver.angular_velocity.dot(normal * total.normal + slip),
             true => velocity.dot(slip) + driver.angular_velocity.dot(normal) * total.normal,
             false => velocity.dot(normal * total.normal + slip),
         });
     }
     work
+}
+
+/// The work of the drives that move the surfaces of a contact, as a belt (J).
+fn work_of_surfaces(contact: &ContactRow, problem: &StepProblem) -> f64 {
+    let end = (contact.first_point + contact.point_count) as usize;
+    let rows = if problem.has_friction_at_patches() { end..end + 1 } else { contact.first_point as usize..end };
+    let totals = problem.totals[rows.clone()].iter().zip(&problem.points[rows]);
+    // Friction on b does work on both bodies together and on the slip.
+    -totals.map(|(t, p)| f64::from(t.tangent_1 * p.slip_1 + t.tangent_2 * p.slip_2)).sum::<f64>()
 }
 
 /// Energy of the springs of a contact at the start of the step, and now (J): m v²/2 with v = w s at the overlap s, at

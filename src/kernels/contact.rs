@@ -5,7 +5,7 @@
 //! fuller ones. With friction per manifold, the last row is the patch.
 
 use super::Rules;
-use super::friction::{solve_friction, solve_twist};
+use super::friction::{solve_friction, solve_rolling, solve_twist};
 use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::collide::MAX_POINTS;
@@ -259,7 +259,7 @@ pub fn warm_start<L: Lane>(rules: Rules, pair: &mut Pair<L>, contact: &Contact<L
     for k in 0..end {
         let (point, impulse) = (rows.point(k), rows.impulse(k));
         let mut p = contact.normal * impulse.normal;
-        if rules.friction != FrictionRule::None && !rules.patch {
+        if rules.friction != FrictionRule::None && !rules.is_at_patch() {
             p += contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         }
         apply_impulse(rules, pair, point.r_a, point.r_b, p);
@@ -267,10 +267,13 @@ pub fn warm_start<L: Lane>(rules: Rules, pair: &mut Pair<L>, contact: &Contact<L
     if rules.friction != FrictionRule::None && rules.patch {
         let (patch, impulse) = (rows.point(end), rows.impulse(end));
         let twist = contact.normal * impulse.normal;
-        pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, twist);
-        pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, twist);
         let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-        apply_impulse(rules, pair, patch.r_a, patch.r_b, p);
+        let turn = if rules.rolls { twist + p } else { twist };
+        pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, turn);
+        pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, turn);
+        if !rules.rolls {
+            apply_impulse(rules, pair, patch.r_a, patch.r_b, p);
+        }
     }
 }
 
@@ -315,7 +318,7 @@ fn sweep_friction<L: Lane>(
     rows: &mut impl PointRows<L>,
 ) {
     let end = rules.contact_points(rows.count());
-    if rules.patch {
+    if rules.is_at_patch() {
         let (mut pressed, mut lever) = (L::constant(0.0), L::constant(0.0));
         for k in 0..end {
             let normal = rows.impulse(k).normal;
@@ -327,12 +330,22 @@ fn sweep_friction<L: Lane>(
         solve_friction(rules, params, pair, contact, &patch, pressed, &mut impulse);
         rows.set_normal(end, impulse.normal);
         rows.set_friction(end, impulse.tangent_1, impulse.tangent_2);
-    } else {
-        for k in 0..end {
-            let mut impulse = rows.impulse(k);
-            solve_friction(rules, params, pair, contact, &rows.point(k), impulse.normal, &mut impulse);
-            rows.set_friction(k, impulse.tangent_1, impulse.tangent_2);
+        return;
+    }
+    let mut pressed = L::constant(0.0);
+    for k in 0..end {
+        let mut impulse = rows.impulse(k);
+        solve_friction(rules, params, pair, contact, &rows.point(k), impulse.normal, &mut impulse);
+        rows.set_friction(k, impulse.tangent_1, impulse.tangent_2);
+        if rules.rolls {
+            pressed = pressed + impulse.normal;
         }
+    }
+    if rules.rolls {
+        let (patch, mut impulse) = (rows.point(end), rows.impulse(end));
+        solve_rolling(rules, params, pair, contact, &patch, pressed, &mut impulse);
+        rows.set_normal(end, impulse.normal);
+        rows.set_friction(end, impulse.tangent_1, impulse.tangent_2);
     }
 }
 

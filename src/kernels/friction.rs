@@ -89,3 +89,33 @@ pub fn solve_twist<L: Lane>(
     pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, change);
     pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, change);
 }
+
+/// Friction against the relative spin of two bodies, at the patch of a manifold whose normal impulses add up to
+/// `pressed`. `slip_1` of the patch is the lever of friction against spin about the normal, and `slip_2` that against
+/// rolling, which is spin about the tangents (m). Both tangents share one step length, as in [`solve_friction`].
+#[inline(always)]
+pub fn solve_rolling<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    pair: &mut Pair<L>,
+    contact: &Contact<L>,
+    patch: &Point<L>,
+    pressed: L,
+    impulse: &mut Impulse<L>,
+) {
+    let tangent_2 = cross3(contact.normal, contact.tangent);
+    let mut w = pair.b.w - pair.a.w;
+    if rules.from_start {
+        w += pair.start_b.w - pair.start_a.w;
+    }
+    let [about_normal, rolling] = [patch.normal_mass, patch.tangent_mass].map(|mass| params.relaxation * mass);
+    let spun = clamp_abs(impulse.normal - about_normal * dot3(w, contact.normal), patch.slip_1 * pressed);
+    let rolled =
+        [impulse.tangent_1 - rolling * dot3(w, contact.tangent), impulse.tangent_2 - rolling * dot3(w, tangent_2)];
+    let rolled = allowed_friction(FrictionRule::Disc, rolled, patch.slip_2 * pressed);
+    let turn = contact.normal * (spun - impulse.normal)
+        + (contact.tangent * (rolled[0] - impulse.tangent_1) + tangent_2 * (rolled[1] - impulse.tangent_2));
+    (impulse.normal, impulse.tangent_1, impulse.tangent_2) = (spun, rolled[0], rolled[1]);
+    pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, turn);
+    pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, turn);
+}

@@ -32,8 +32,11 @@ pub struct Rules {
     pub biased: bool,
     /// The model of friction.
     pub friction: FrictionRule,
-    /// Whether friction acts once for each manifold.
+    /// Whether a row for the whole manifold, the patch, follows the rows of its points. Friction acts there once for
+    /// each manifold, unless the contact `rolls`.
     pub patch: bool,
+    /// Whether the patch resists rolling and spinning; friction then acts at the points. Requires patches.
+    pub rolls: bool,
     /// Whether friction comes before the normal impulses.
     pub friction_first: bool,
     /// Whether the sum of the normal impulses is clamped; otherwise each correction is.
@@ -44,7 +47,7 @@ pub struct Rules {
     pub as_one: bool,
     /// Number of sweeps over a manifold before the next one, at least 1.
     pub passes: u8,
-    /// Whether surfaces move by themselves, as a belt does. Friction at points then also opposes `slip_1` and `slip_2`,
+    /// Whether surfaces move by themselves, as a belt does. Friction then also opposes `slip_1` and `slip_2` of its row,
     /// velocities relative to the bodies (m/s). Requires box or disc friction.
     pub driven: bool,
     /// Whether corrections are compared with the tolerance.
@@ -72,6 +75,7 @@ impl Rules {
         biased: false,
         friction: FrictionRule::None,
         patch: false,
+        rolls: false,
         friction_first: false,
         accumulated: true,
         round: false,
@@ -87,13 +91,20 @@ impl Rules {
 
     /// The rules of a warm start, which needs only those of friction and inertia.
     pub fn of_warm_start(self) -> Self {
-        Self { friction: self.friction, patch: self.patch, isotropic: self.isotropic, ..Self::default() }
+        let Self { friction, patch, rolls, isotropic, .. } = self;
+        Self { friction, patch, rolls, isotropic, ..Self::default() }
     }
 
     /// The rules of joints.
     pub fn of_joints(self) -> Self {
         let Self { biased, measured, from_start, axes, .. } = self;
         Self { biased, measured, from_start, axes, ..Self::default() }
+    }
+
+    /// Whether friction acts once for each manifold, at its patch.
+    #[inline(always)]
+    pub fn is_at_patch(self) -> bool {
+        self.patch && !self.rolls
     }
 
     /// Number of contact points among the rows of a manifold. The patch does not count.

@@ -90,9 +90,9 @@ pub struct Point<L> {
     pub tangent_mass: L,
     /// Normal velocity when the step begins.
     pub approach_velocity: L,
-    /// Slip direction along the first tangent; with friction per manifold, distance from the patch.
+    /// Slip along the first tangent; with friction per manifold, distance from the patch. See `PointRow`.
     pub slip_1: L,
-    /// Slip direction along the second tangent.
+    /// Slip along the second tangent.
     pub slip_2: L,
 }
 
@@ -272,6 +272,7 @@ impl<S: Scalar> Mass<S> {
         Self {
             inv_inertia: Sym3 { x: Vec3::load(r.inv_inertia_x), yz: Vec3::load(r.inv_inertia_yz) },
             inv_mass: S::from(r.inv_mass),
+            locks: S::from(r.locks),
             acceleration: Vec3::load(r.acceleration),
         }
     }
@@ -282,6 +283,7 @@ impl<S: Scalar> Mass<S> {
             inv_inertia_x: self.inv_inertia.x.store(),
             inv_mass: self.inv_mass.to_f32(),
             inv_inertia_yz: self.inv_inertia.yz.store(),
+            locks: self.locks.to_f32(),
             acceleration: self.acceleration.store(),
             ..MassRow::default()
         }

@@ -240,7 +240,8 @@ impl fmt::Display for Kernel {
             let named = [
                 (r.biased, "biased"),
                 (r.friction != FrictionRule::None, friction),
-                (r.patch, "per manifold"),
+                (r.is_at_patch(), "per manifold"),
+                (r.rolls, "rolling"),
                 (r.friction_first, "first"),
                 (!r.accumulated, "clamped per correction"),
                 (r.round, "round"),

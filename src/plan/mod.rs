@@ -154,15 +154,17 @@ impl StepPlan {
 
     /// The same with a known summary of the contacts.
     pub fn with_summary(config: &SolverConfig, problem: &StepProblem, contacts: &ContactSummary) -> Self {
-        let friction = if contacts.friction { config.friction_rule() } else { FrictionRule::None };
+        let friction =
+            if contacts.friction || problem.params.rolls != 0 { config.friction_rule() } else { FrictionRule::None };
         let rules = Rules {
             friction,
             patch: problem.has_patches(),
+            rolls: problem.params.rolls != 0,
             friction_first: config.rules.friction_order == FrictionOrder::FrictionFirst,
             accumulated: config.rules.clamping == Clamping::Accumulated,
             round: contacts.round,
             as_one: false,
-            driven: false,
+            driven: problem.params.driven != 0 && friction != FrictionRule::None,
             passes: config.rules.manifold_passes,
             measured: config.tolerance > 0.0,
             biased: false,

@@ -28,8 +28,23 @@ pub struct Mass<L> {
     pub inv_inertia: Sym3<L>,
     /// Inverse mass.
     pub inv_mass: L,
+    /// The axes along which nothing moves the body: the sum of 1 for x, 2 for y and 4 for z.
+    pub locks: L,
     /// Gravity plus force over mass.
     pub acceleration: Vec3<L>,
+}
+
+impl<L: Lane> Mass<L> {
+    /// A vector without its components along locked axes. Twin of the WGSL function of this name.
+    #[inline(always)]
+    pub fn unlocked(&self, v: Vec3<L>) -> Vec3<L> {
+        let zero = L::constant(0.0);
+        let z = self.locks.gt(L::constant(3.5));
+        let rest = self.locks - L::select(zero, L::constant(4.0), z);
+        let y = rest.gt(L::constant(1.5));
+        let x = (rest - L::select(zero, L::constant(2.0), y)).gt(L::constant(0.5));
+        vec3(L::select(v.x, zero, x), L::select(v.y, zero, y), L::select(v.z, zero, z))
+    }
 }
 
 /// No solid of even density jams with friction up to this. A point at the distance r from the center of such a solid
@@ -64,16 +79,17 @@ pub fn tangent_of<L: Lane>(n: Vec3<L>) -> Vec3<L> {
     vec3(n.x * n.y * a, sign + n.y * n.y * a, -n.y)
 }
 
-/// Contribution of one body to the entry (d, e) of G M⁻¹ Gᵀ at the arm r.
+/// Contribution of one body to the entry (d, e) of G M⁻¹ Gᵀ at the arm r. `locked`: some body has locked axes.
 #[inline(always)]
-fn entry_of<L: Lane>(mass: &Mass<L>, r: Vec3<L>, d: Vec3<L>, e: Vec3<L>) -> L {
-    mass.inv_mass * dot3(d, e) + dot3(cross3(r, d), mass.inv_inertia.times(cross3(r, e)))
+fn entry_of<L: Lane>(locked: bool, mass: &Mass<L>, r: Vec3<L>, d: Vec3<L>, e: Vec3<L>) -> L {
+    let moved = if locked { mass.unlocked(d) } else { d };
+    mass.inv_mass * dot3(moved, e) + dot3(cross3(r, d), mass.inv_inertia.times(cross3(r, e)))
 }
 
 /// The entry (d, e) of G M⁻¹ Gᵀ at the arms of a and b.
 #[inline(always)]
-pub fn entry<L: Lane>(a: &Mass<L>, b: &Mass<L>, r_a: Vec3<L>, r_b: Vec3<L>, d: Vec3<L>, e: Vec3<L>) -> L {
-    entry_of(a, r_a, d, e) + entry_of(b, r_b, d, e)
+pub fn entry<L: Lane>(locked: bool, [a, b]: [&Mass<L>; 2], [r_a, r_b]: [Vec3<L>; 2], d: Vec3<L>, e: Vec3<L>) -> L {
+    entry_of(locked, a, r_a, d, e) + entry_of(locked, b, r_b, d, e)
 }
 
 /// One over the largest eigenvalue of the tangential block with the entries s_11, s_22 and s_12; 0 if the block is
@@ -137,30 +153,39 @@ pub struct PointMasses<L> {
     pub jamming: L,
 }
 
-/// The effective masses of a point at the arms `r_a` and `r_b`. `tangents`: friction has two directions. `jams`: some
-/// surface has more friction than [`MIN_JAMMING`].
+/// The facts about all bodies and surfaces that effective masses depend on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointKinds {
+    /// Whether friction has two directions.
+    pub tangents: bool,
+    /// Whether some surface has more friction than [`MIN_JAMMING`].
+    pub jams: bool,
+    /// Whether some body has locked axes.
+    pub locked: bool,
+}
+
+/// The effective masses of a point at the arms `r_a` and `r_b`.
 #[inline(always)]
 pub fn point_masses<L: Lane>(
-    tangents: bool,
-    jams: bool,
+    kinds: PointKinds,
     frame: &Frame<L>,
-    a: &Mass<L>,
-    b: &Mass<L>,
-    r_a: Vec3<L>,
-    r_b: Vec3<L>,
+    masses: [&Mass<L>; 2],
+    arms: [Vec3<L>; 2],
 ) -> PointMasses<L> {
+    let PointKinds { tangents, jams, locked } = kinds;
     let (n, t_1) = (frame.normal, frame.tangent);
     let t_2 = cross3(n, t_1);
-    let parted = entry(a, b, r_a, r_b, n, n);
+    let entry = |d: Vec3<L>, e: Vec3<L>| entry(locked, masses, arms, d, e);
+    let parted = entry(n, n);
     let mut masses = PointMasses { normal: inverse_or_zero(parted), ..PointMasses::default() };
     if jams {
-        let pressed_1 = entry(a, b, r_a, r_b, n, t_1);
-        masses.jamming = jamming(frame.friction, parted, pressed_1, entry(a, b, r_a, r_b, n, t_2));
+        let pressed_1 = entry(n, t_1);
+        masses.jamming = jamming(frame.friction, parted, pressed_1, entry(n, t_2));
         masses.normal = masses.normal * normal_step(masses.jamming);
     }
     if tangents {
-        let (s_11, s_22) = (entry(a, b, r_a, r_b, t_1, t_1), entry(a, b, r_a, r_b, t_2, t_2));
-        masses.tangent = tangent_mass(s_11, s_22, entry(a, b, r_a, r_b, t_1, t_2));
+        let (s_11, s_22) = (entry(t_1, t_1), entry(t_2, t_2));
+        masses.tangent = tangent_mass(s_11, s_22, entry(t_1, t_2));
     }
     masses
 }

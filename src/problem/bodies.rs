@@ -36,7 +36,11 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: 
     let state = |(i, b): (usize, &Body)| {
         let moves = b.kind != BodyKind::Fixed && !rests(i);
         let velocity = |v: Vec3| if moves { v.to_array() } else { [0.0; 3] };
-        BodyRow { v: velocity(b.linear_velocity), w: velocity(b.allowed_spin(b.angular_velocity)), ..BodyRow::AT_REST }
+        BodyRow {
+            v: velocity(b.allowed_velocity(b.linear_velocity)),
+            w: velocity(b.allowed_spin(b.angular_velocity)),
+            ..BodyRow::AT_REST
+        }
     };
     world.bodies.par_iter().with_min_len(MIN_BODIES).enumerate().map(state).collect_into_vec(&mut problem.bodies);
     let has_torques = AtomicBool::new(false);
@@ -47,7 +51,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: 
         if b.whole_torque() != Vec3::ZERO {
             has_torques.store(true, Ordering::Relaxed);
         }
-        let acceleration = (world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array();
+        let acceleration = b.unlocked(world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array();
         MassRow { acceleration, ..mass_row(b) }
     };
     world.bodies.par_iter().with_min_len(MIN_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);
@@ -87,6 +91,7 @@ pub(super) fn mass_row(body: &Body) -> MassRow {
         inv_inertia_x: [i.x_axis.x, i.x_axis.y, i.x_axis.z],
         inv_inertia_yz: [i.y_axis.y, i.y_axis.z, i.z_axis.z],
         inv_mass: 1.0 / body.mass.mass,
+        locks: body.locks(),
         ..MassRow::default()
     }
 }
@@ -105,7 +110,7 @@ pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
             body.rotation = unit(product(Quat::from_array(row.dq), body.rotation));
         }
         body.position = center - body.rotation * body.mass.center;
-        body.linear_velocity = Vec3::from_array(row.v);
+        body.linear_velocity = body.allowed_velocity(Vec3::from_array(row.v));
         body.angular_velocity = body.allowed_spin(Vec3::from_array(row.w));
     });
 }

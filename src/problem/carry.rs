@@ -18,13 +18,16 @@ pub struct Carry {
     pub written: Vec<Written>,
     /// Whether approach velocities and slips of reused points also follow the bodies, besides their separations.
     pub approach: bool,
+    /// Whether points have surface velocities, patches resist rolling, or bodies have locked translations. The device
+    /// cannot compute such rows.
+    pub surfaces: bool,
     /// Whether friction at points has two directions.
     pub tangents: bool,
     /// The coefficients of the preloads.
     pub preload: Preload,
 }
 
-crate::saved::cloned!(Carry { on_device, written, approach, tangents, preload });
+crate::saved::cloned!(Carry { on_device, written, approach, surfaces, tangents, preload });
 
 /// A contact whose rows were written again, 8 B.
 #[repr(C)]

@@ -17,6 +17,7 @@ use super::write::{SlotRows, Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS, Manifold};
 use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::{self, Effort, Interface};
+use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
 use crate::stats::HardestContact;
 use crate::world::{Body, BodyKind, Joint, Material, World};
@@ -28,8 +29,8 @@ pub struct ContactRows {
     graph: ConstraintGraph,
     /// The coloring of this step's contacts.
     pub coloring: Coloring,
-    /// Whether every manifold has a row for its own friction.
-    patches: bool,
+    /// The rows and slips that contacts have.
+    layout: Layout,
     /// The data that the manifold of each slot was computed from.
     computed: Vec<ComputedRow>,
     /// The poses of bodies.
@@ -60,7 +61,7 @@ pub struct ContactRows {
 crate::saved::cloned!(ContactRows {
     slots,
     coloring,
-    patches,
+    layout,
     computed,
     jams,
     classes,
@@ -70,6 +71,42 @@ crate::saved::cloned!(ContactRows {
     carry,
 } scratch { graph, poses, struck, fast, jointed, new_bodies });
 
+/// The rows that contacts have besides those of their points, and whether rows have slips.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Layout {
+    /// Whether a patch follows the points of every contact.
+    pub patches: bool,
+    /// Whether patches resist rolling and spinning, and friction acts at the points.
+    pub rolls: bool,
+    /// Whether some surface moves by itself.
+    pub driven: bool,
+}
+
+crate::saved::fields!(Layout { patches, rolls, driven });
+
+impl Layout {
+    fn of(config: &SolverConfig, materials: &Materials) -> Self {
+        let has_friction = config.friction_rule() != FrictionRule::None;
+        let [rolls, driven] = [materials.rolls, materials.driven].map(|some| some && has_friction);
+        Self { patches: rolls || has_friction && config.friction_at == FrictionAt::Manifold, rolls, driven }
+    }
+
+    /// Whether friction acts once for each manifold, at its patch.
+    pub fn is_at_patch(self) -> bool {
+        self.patches && !self.rolls
+    }
+}
+
+/// Refuses a material that the settings cannot follow.
+pub fn check_material(config: &SolverConfig, material: &Material) -> Result<()> {
+    ensure(!material.rolls() || config.friction_at == FrictionAt::Points, || {
+        "rolling_friction and spinning_friction need the setting friction_at = points".into()
+    })?;
+    ensure(!material.is_driven() || config.friction_rule() != FrictionRule::Slip, || {
+        "surface_velocity needs the setting slip_friction = false".into()
+    })
+}
+
 /// Common facts about the materials of a world.
 #[derive(Clone, Copy, Debug, Default)]
 struct Materials {
@@ -77,15 +114,21 @@ struct Materials {
     bounce: bool,
     /// Whether any surface has more friction than [`MIN_JAMMING`].
     may_jam: bool,
+    /// Whether any surface resists rolling or spinning.
+    rolls: bool,
+    /// Whether any surface moves by itself.
+    driven: bool,
 }
 
-crate::saved::fields!(Materials { bounce, may_jam });
+crate::saved::fields!(Materials { bounce, may_jam, rolls, driven });
 
 impl Materials {
     fn among(all: impl Iterator<Item = Material> + Clone) -> Self {
         Self {
             bounce: all.clone().any(|material| material.restitution > 0.0),
             may_jam: all.clone().any(|material| material.friction > MIN_JAMMING),
+            rolls: all.clone().any(|material| material.rolls()),
+            driven: all.clone().any(|material| material.is_driven()),
         }
     }
 
@@ -95,8 +138,13 @@ impl Materials {
 
     /// The same facts with the materials of hooks.
     fn and(self, hooked: &[Option<Material>]) -> Self {
-        let Self { bounce, may_jam } = Self::among(hooked.iter().flatten().copied());
-        Self { bounce: self.bounce || bounce, may_jam: self.may_jam || may_jam }
+        let Self { bounce, may_jam, rolls, driven } = Self::among(hooked.iter().flatten().copied());
+        Self {
+            bounce: self.bounce || bounce,
+            may_jam: self.may_jam || may_jam,
+            rolls: self.rolls || rolls,
+            driven: self.driven || driven,
+        }
     }
 }
 
@@ -203,7 +251,7 @@ impl ContactRows {
     pub fn sort(&mut self, detector: &mut Detector, problem: &mut StepProblem) {
         let from = self.slots.sort(&self.coloring.order, detector);
         self.coloring.order = (0..self.coloring.order.len() as u32).collect();
-        let stride = points_a_slot(self.patches);
+        let stride = points_a_slot(self.layout.patches);
         if !problem.contacts.is_empty() {
             problem.contacts = moved(&problem.contacts, &from, 1);
             (0..).zip(&mut problem.contacts).for_each(|(i, contact)| contact.first_point = i * stride as u32);
@@ -397,12 +445,18 @@ impl ContactRows {
         dt: f32,
         problem: &mut StepProblem,
     ) {
-        let patches = config.friction_at == FrictionAt::Manifold && config.friction_rule() != FrictionRule::None;
-        self.lay_out(patches, problem);
+        let materials = self.materials.get_or_insert_with(|| Materials::of(world)).and(&self.hooked);
+        let Materials { bounce, may_jam, .. } = materials;
+        let layout = Layout::of(config, &materials);
+        // The work of a driven surface follows from the impulses of the whole step.
+        self.sums |= layout.driven;
+        self.lay_out(layout, problem);
         problem.params.point_count = problem.points.len() as u32;
-        problem.params.patches = patches.into();
-        let Materials { bounce, may_jam } =
-            self.materials.get_or_insert_with(|| Materials::of(world)).and(&self.hooked);
+        problem.params.patches = layout.patches.into();
+        problem.params.rolls = layout.rolls.into();
+        problem.params.driven = layout.driven.into();
+        let locked = world.bodies.iter().any(Body::has_locked_translation);
+        self.carry.surfaces = layout.rolls || layout.driven || locked;
         self.carry.approach = config.friction_rule() == FrictionRule::Slip || bounce;
         self.carry.tangents = matches!(config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
         let substep = Substep::new(config, dt / config.substeps as f32);
@@ -414,7 +468,7 @@ impl ContactRows {
         };
         self.note_written(detector);
         let StepProblem { bodies, masses, contacts, points, impulses, sags, .. } = problem;
-        let Self { slots, carry, patches, computed, poses, jams, classes, hooked, .. } = self;
+        let Self { slots, carry, layout, computed, poses, jams, classes, hooked, .. } = self;
         let pose = |body: &Body| PoseRow {
             center: body.center_of_mass().to_array(),
             pad: 0.0,
@@ -438,9 +492,10 @@ impl ContactRows {
             poses,
             carry,
             brings_impulses: true,
-            patches: *patches,
+            layout: *layout,
             hooked,
             may_jam,
+            locked,
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
@@ -449,20 +504,24 @@ impl ContactRows {
 
     /// Makes room for the rows of all slots. If friction moves between points and manifolds, friction begins without
     /// impulses.
-    fn lay_out(&mut self, patches: bool, problem: &mut StepProblem) {
-        let (count, stride) = (self.slots.all.len(), points_a_slot(patches));
-        if patches != self.patches {
-            let before = std::mem::take(&mut problem.impulses);
+    fn lay_out(&mut self, layout: Layout, problem: &mut StepProblem) {
+        let (count, stride) = (self.slots.all.len(), points_a_slot(layout.patches));
+        let before = std::mem::replace(&mut self.layout, layout);
+        if layout.patches != before.patches || layout.rolls != before.rolls {
+            // A device has the rows of the layout before.
+            self.carry.on_device = false;
+            let stays = layout.is_at_patch() == before.is_at_patch();
+            let impulses = std::mem::take(&mut problem.impulses);
             problem.impulses.resize(problem.contacts.len() * stride, ImpulseRow::default());
-            for (now, before) in problem.impulses.chunks_mut(stride).zip(before.chunks(points_a_slot(self.patches))) {
+            let rows = impulses.chunks(points_a_slot(before.patches));
+            for (now, before) in problem.impulses.chunks_mut(stride).zip(rows) {
                 for (now, before) in now.iter_mut().zip(&before[..MAX_POINTS]) {
-                    now.normal = before.normal;
+                    *now = if stays { *before } else { ImpulseRow { normal: before.normal, ..ImpulseRow::default() } };
                 }
             }
             for (now, contact) in problem.impulses.chunks_mut(stride).zip(&problem.contacts) {
                 now[contact.point_count as usize..].fill(ImpulseRow::default());
             }
-            self.patches = patches;
         }
         problem.contacts.resize(count, ContactRow::default());
         problem.sags.resize(count, 0.0);

@@ -15,6 +15,8 @@ pub use super::arithmetic::MIN_JAMMING;
 pub struct InverseMass {
     /// Inverse mass; 0 if nothing moves the body.
     pub mass: f32,
+    /// The axes along which nothing moves the body: [`MassRow::locks`].
+    pub locks: f32,
     /// Inverse of the inertia about the center of mass.
     pub inertia: Mat3,
 }
@@ -23,14 +25,18 @@ impl InverseMass {
     /// The inverse mass and inertia of a row.
     pub fn of(row: &MassRow) -> Self {
         let ([xx, xy, xz], [yy, yz, zz]) = (row.inv_inertia_x, row.inv_inertia_yz);
-        Self { mass: row.inv_mass, inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]) }
+        Self {
+            mass: row.inv_mass,
+            locks: row.locks,
+            inertia: Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
+        }
     }
 
     /// The same in the form of the kernels.
     fn lane(&self) -> Mass<f32> {
         let Mat3 { x_axis: x, y_axis: y, z_axis: z } = self.inertia;
         let inv_inertia = Sym3 { x: math::vec3(x.x, y.x, z.x), yz: math::vec3(y.y, z.y, z.z) };
-        Mass { inv_inertia, inv_mass: self.mass, ..Mass::default() }
+        Mass { inv_inertia, inv_mass: self.mass, locks: self.locks, ..Mass::default() }
     }
 }
 
@@ -68,6 +74,13 @@ impl EffectiveMass<'_> {
         twist_mass(n, &self.inverse[0].lane(), &self.inverse[1].lane())
     }
 
+    /// One over the largest eigenvalue of the inverse inertias about the tangents.
+    pub fn rolling(&self) -> f32 {
+        let (t_1, t_2) = self.row.tangents();
+        let inertia = self.inverse[0].inertia + self.inverse[1].inertia;
+        tangent_mass(t_1.dot(inertia * t_1), t_2.dot(inertia * t_2), t_1.dot(inertia * t_2))
+    }
+
     /// How strongly friction jams a point: `jamming` in `src/problem/arithmetic.rs`.
     pub fn jamming(&self, r_a: Vec3, r_b: Vec3) -> f32 {
         let n = Vec3::from_array(self.row.normal);
@@ -79,6 +92,6 @@ impl EffectiveMass<'_> {
     /// The entry of the directions `d` and `e` at arms `r_a`, `r_b`.
     pub fn entry(&self, r_a: Vec3, r_b: Vec3, d: Vec3, e: Vec3) -> f32 {
         let [r_a, r_b, d, e] = [r_a, r_b, d, e].map(|v| math::Vec3::load(v.to_array()));
-        arithmetic::entry(&self.inverse[0].lane(), &self.inverse[1].lane(), r_a, r_b, d, e)
+        arithmetic::entry(true, [&self.inverse[0].lane(), &self.inverse[1].lane()], [r_a, r_b], d, e)
     }
 }

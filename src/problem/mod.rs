@@ -29,7 +29,7 @@ pub use arithmetic::{Mass, Sym3};
 pub(crate) use axes::drive_count;
 pub use blocks::{Block, lay_out};
 pub use bodies::{begin, store};
-pub use contacts::ContactRows;
+pub use contacts::{ContactRows, check_material};
 pub use damping::write_dampings;
 pub(crate) use effective::InverseMass;
 pub use joint_systems::{BlockRow, ImpulseNumber, JointSystems, NodeRow};
@@ -65,7 +65,7 @@ use crate::saved::{Archive, Saved};
 /// problem.check()?;
 /// assert_eq!((problem.swept_contacts().count(), problem.rows_of(&problem.contact_colors()).len()), (3, 3));
 /// assert!(problem.joint_colors().is_empty() && problem.system_colors().len() <= 1 && !problem.has_systems());
-/// assert!(problem.impulse_count() >= 12 && !problem.has_patches() && problem.is_isotropic(&[1, 2, 3]));
+/// assert!(problem.impulse_count() >= 12 && !problem.has_patches() && !problem.has_friction_at_patches() && problem.is_isotropic(&[1, 2, 3]));
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Debug, Default, PartialEq)]
@@ -176,6 +176,8 @@ impl Saved for StepProblem {
             momentum: _,
         } = self;
         params.patches.walk(archive)?;
+        params.rolls.walk(archive)?;
+        params.driven.walk(archive)?;
         joint_impulses.walk(archive)?;
         systems.walk(archive)
     }
@@ -256,6 +258,11 @@ impl StepProblem {
     /// Whether a patch follows the points of every contact.
     pub fn has_patches(&self) -> bool {
         self.params.patches != 0
+    }
+
+    /// Whether friction acts once for each manifold, at its patch.
+    pub fn has_friction_at_patches(&self) -> bool {
+        self.has_patches() && self.params.rolls == 0
     }
 
     /// Whether any axis is a limit or a drive.

@@ -10,8 +10,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::arithmetic::{Frame, Pose, movement_since, point_masses};
-use super::arithmetic::{Mass, Sym3};
+use super::arithmetic::{Frame, Mass, PointKinds, Pose, Sym3, movement_since, point_masses};
 use super::carry::{Preload, preloaded};
 use super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
 use crate::collide::{MAX_POINTS, Manifold, Placed};
@@ -84,7 +83,7 @@ pub(super) struct PrepareSlots<'a> {
 #[derive(Clone, Copy)]
 pub(super) enum Preparation {
     /// The effective masses of points.
-    Masses { tangents: bool, jams: bool },
+    Masses(PointKinds),
     /// The present separations of points, and then preloads and sags from the impulses of the step before.
     Begin { separations: bool, loads: bool },
 }
@@ -161,10 +160,10 @@ impl PrepareSlots<'_> {
     fn masses<L: Lanes>(&self, bodies: &[u32; WIDTH]) -> Mass<L> {
         let places = places(bodies, units::<MassRow>(), 0);
         // SAFETY: `group` has compared each body with the length.
-        let [xx, xy, xz, inv_mass, yy, yz, zz, _] =
+        let [xx, xy, xz, inv_mass, yy, yz, zz, locks] =
             unsafe { L::gathered(self.rows.masses.as_ptr().cast::<Row8>(), &places) };
         let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
-        Mass { inv_inertia, inv_mass, acceleration: Default::default() }
+        Mass { inv_inertia, inv_mass, locks, acceleration: Default::default() }
     }
 
     #[inline(always)]
@@ -176,7 +175,7 @@ impl PrepareSlots<'_> {
     }
 
     #[inline(always)]
-    fn write_masses<L: Lanes>(&self, group: &Group, tangents: bool, jams: bool) {
+    fn write_masses<L: Lanes>(&self, group: &Group, kinds: PointKinds) {
         let [nx, ny, nz, friction, tx, ty, tz, _] = self.contacts::<L>(group, 0);
         let frame = Frame { normal: vec3(nx, ny, nz), tangent: vec3(tx, ty, tz), friction };
         let (a, b) = (self.masses::<L>(&group.bodies[0]), self.masses::<L>(&group.bodies[1]));
@@ -184,7 +183,7 @@ impl PrepareSlots<'_> {
         for k in 0..group.most as usize {
             let [ax, ay, az, _, bx, by, bz, _] = self.points::<L>(group, k);
             let (r_a, r_b) = (vec3(ax, ay, az), vec3(bx, by, bz));
-            let masses = point_masses(tangents, jams, &frame, &a, &b, r_a, r_b);
+            let masses = point_masses(kinds, &frame, [&a, &b], [r_a, r_b]);
             let (normal, tangent, jamming) = (masses.normal.store(), masses.tangent.store(), masses.jamming.store());
             for (lane, jams) in jammed.iter_mut().enumerate().take(group.len) {
                 if k < group.counts[lane] as usize {
@@ -268,7 +267,7 @@ impl Work for PrepareSlots<'_> {
         for group in groups {
             let group = self.group(group);
             match self.preparation {
-                Preparation::Masses { tangents, jams } => self.write_masses::<L>(&group, tangents, jams),
+                Preparation::Masses(kinds) => self.write_masses::<L>(&group, kinds),
                 Preparation::Begin { separations, loads } => self.begin::<L>(&group, separations, loads),
             }
         }
@@ -291,6 +290,8 @@ mod tests {
     use crate::lanes::InstructionSet;
     use crate::math::{self, NormalMovement};
     use crate::random::SplitMix64;
+
+    const ALL: PointKinds = PointKinds { tangents: true, jams: true, locked: true };
 
     const STRIDE: usize = MAX_POINTS + 1;
     const SLOTS: usize = 53;
@@ -327,6 +328,7 @@ mod tests {
                 inv_inertia_x: [3.0 + x, 0.3 * y, 0.2 * z].map(|i| movable * i),
                 inv_inertia_yz: [2.0 + y, 0.1 * x, 4.0 + z].map(|i| movable * i),
                 inv_mass: movable * (1.5 + x),
+                locks: (k % 8) as f32,
                 ..MassRow::default()
             }
         });
@@ -364,9 +366,7 @@ mod tests {
     }
 
     fn in_lanes(tables: &mut Tables, slots: &[u32], set: InstructionSet) {
-        for preparation in
-            [Preparation::Masses { tangents: true, jams: true }, Preparation::Begin { separations: true, loads: true }]
-        {
+        for preparation in [Preparation::Masses(ALL), Preparation::Begin { separations: true, loads: true }] {
             let rows = Prepare {
                 stride: STRIDE,
                 masses: &tables.masses,
@@ -405,7 +405,7 @@ mod tests {
             for (k, at) in own.enumerate() {
                 let point = &mut tables.points[at];
                 let (r_a, r_b) = (load(point.r_a), load(point.r_b));
-                let masses = point_masses(true, true, &frame, &a, &b, r_a, r_b);
+                let masses = point_masses(ALL, &frame, [&a, &b], [r_a, r_b]);
                 (point.normal_mass, point.tangent_mass) = (masses.normal, masses.tangent);
                 point.separation = from.separations[k] + movement.between(r_a, r_b);
                 tables.jams[i] |= masses.jamming > 1.0;

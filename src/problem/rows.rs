@@ -61,8 +61,8 @@ pub struct MassRow {
     pub inv_mass: f32,
     /// Inverse inertia; yy yz zz.
     pub inv_inertia_yz: [f32; 3],
-    #[doc(hidden)]
-    pub pad_inertia: f32,
+    /// The world axes along which nothing moves the body: the sum of 1 for x, 2 for y and 4 for z.
+    pub locks: f32,
     /// Gravity plus force over mass (m/s²).
     pub acceleration: [f32; 3],
     #[doc(hidden)]
@@ -137,7 +137,8 @@ pub struct ContactRow {
     pub first_point: u32,
     /// Number of its points, 1 to 4. With friction per manifold one more row follows them: the patch. Its arms are the
     /// means of the points' arms, its normal mass is that of the twist about the normal, and its normal impulse is that
-    /// of the twist.
+    /// of the twist. With rolling or spinning friction, the row after the points has only angular impulses: about the
+    /// normal and about both tangents.
     pub point_count: u32,
     /// Radius of curvature of a's surface at the contact, 0 if flat or sharp (m). A round body turns beneath its
     /// contact.
@@ -203,10 +204,12 @@ pub struct PointRow {
     pub tangent_mass: f32,
     /// Normal velocity when the surfaces meet, negative when approaching (m/s).
     pub approach_velocity: f32,
-    /// Component of the slip direction along the first tangent; with friction per manifold, the distance from the patch
+    /// Component of the slip direction along the first tangent. With friction per manifold, the distance from the patch
+    /// (m). With driven surfaces, the velocity of b's surface relative to a's, beyond that of the bodies (m/s); with
+    /// friction per manifold, only the patch has it. On a patch that resists rolling, the lever of spinning friction
     /// (m).
     pub slip_1: f32,
-    /// Component of the slip direction along the second tangent.
+    /// The same along the second tangent. On a patch that resists rolling, the lever of rolling friction (m).
     pub slip_2: f32,
 }
 
@@ -404,8 +407,10 @@ pub struct Params {
     pub axis_count: u32,
     /// Always 0. Shader compilers cannot know this, and the exact mode in WGSL relies on it.
     pub zero: u32,
-    #[doc(hidden)]
-    pub pad: [u32; 2],
+    /// 1 if patches resist rolling and spinning, and friction acts at the points.
+    pub rolls: u32,
+    /// 1 if some surface moves by itself, as a belt does.
+    pub driven: u32,
 }
 
 /// The length of the substeps of a block, and the coefficients that follow from it, 56 B.

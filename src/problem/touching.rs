@@ -70,7 +70,7 @@ impl StepProblem {
         let friction = |total: &ImpulseRow| tangent_1 * total.tangent_1 + tangent_2 * total.tangent_2;
         let end = (contact.first_point + contact.point_count) as usize;
         let at_points = self.totals[contact.first_point as usize..end].iter();
-        let at_patch = if self.has_patches() { friction(&self.totals[end]) } else { Vec3::ZERO };
+        let at_patch = if self.has_friction_at_patches() { friction(&self.totals[end]) } else { Vec3::ZERO };
         at_points.fold(at_patch, |sum, total| sum + (normal * total.normal + friction(total)))
     }
 }

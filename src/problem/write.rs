@@ -8,8 +8,9 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::arithmetic::{inverse_or_zero, square_root};
+use super::arithmetic::{PointKinds, inverse_or_zero, square_root};
 use super::carry::Carry;
+use super::contacts::Layout;
 use super::effective::{EffectiveMass, InverseMass};
 use super::points_a_slot;
 use super::prepare::{ComputedRow, PoseRow, Preparation, Prepare, PrepareSlots};
@@ -40,12 +41,14 @@ pub(super) struct Writer<'a> {
     pub carry: &'a Carry,
     /// Whether rows that are written again move impulses to the present points. If not, impulses stay in place.
     pub brings_impulses: bool,
-    /// Whether a patch follows the points of every contact.
-    pub patches: bool,
+    /// The rows and slips that contacts have.
+    pub layout: Layout,
     /// The materials that hooks gave to contacts, by slot; empty if they gave none.
     pub hooked: &'a [Option<Material>],
     /// Whether any surface has enough friction that contacts may jam.
     pub may_jam: bool,
+    /// Whether any body has locked translations.
+    pub locked: bool,
 }
 
 /// The rows of neighboring slots.
@@ -84,7 +87,7 @@ impl SelectedSlots {
 impl Writer<'_> {
     /// Writes the rows of all slots, on all threads.
     pub fn write(&self, slots: &[Slot], rows: SlotRows) {
-        let stride = points_a_slot(self.patches);
+        let stride = points_a_slot(self.layout.patches);
         let points = rows.points.par_chunks_mut(SLOTS_A_TASK * stride);
         let points = points.zip(rows.impulses.par_chunks_mut(SLOTS_A_TASK * stride));
         let slots_rows = rows.computed.par_chunks_mut(SLOTS_A_TASK).zip(rows.sags.par_chunks_mut(SLOTS_A_TASK));
@@ -99,7 +102,7 @@ impl Writer<'_> {
 
     /// Writes the rows of consecutive slots, the first of which has the number `first`.
     fn write_some(&self, first: usize, slots: &[Slot], mut rows: SlotRows) {
-        let stride = points_a_slot(self.patches);
+        let stride = points_a_slot(self.layout.patches);
         let written = SelectedSlots::of(slots, |slot| slot.write != Write::Separations);
         let begun = SelectedSlots::of(slots, |slot| slot.takes_part);
         self.write_rows(first, slots, &written, &mut rows);
@@ -132,28 +135,53 @@ impl Writer<'_> {
 
     /// Writes the values of chosen slots that follow from their manifolds, materials and masses.
     pub fn write_rows(&self, first: usize, slots: &[Slot], written: &SelectedSlots, rows: &mut SlotRows) {
-        let stride = points_a_slot(self.patches);
+        let stride = points_a_slot(self.layout.patches);
         for &i in written.all() {
             let (slot, i) = (&slots[i as usize], i as usize);
             rows.contacts[i].first_point = ((first + i) * stride) as u32;
             self.write_slot(slot, (first + i, i), rows);
         }
-        let preparation = Preparation::Masses { tangents: self.carry.tangents, jams: self.may_jam };
+        let kinds = PointKinds { tangents: self.carry.tangents, jams: self.may_jam, locked: self.locked };
+        let preparation = Preparation::Masses(kinds);
         self.prepare(rows, written.all(), preparation);
-        if self.patches {
+        if self.layout != Layout::default() {
             for &i in written.all() {
-                let contact = &rows.contacts[i as usize];
-                let inverse = [contact.body_a, contact.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
+                let (slot, number) = (&slots[i as usize], first + i as usize);
                 let own = &mut rows.points[i as usize * stride..][..stride];
-                let (points, patch) = own.split_at_mut(contact.point_count as usize);
-                patch[0] = patch_of(&EffectiveMass { inverse: &inverse, row: contact }, points);
+                self.write_surface(slot, number, &rows.contacts[i as usize], own);
             }
         }
     }
 
+    /// Writes the patch of a contact, and the velocity of its surfaces.
+    fn write_surface(&self, slot: &Slot, number: usize, contact: &ContactRow, own: &mut [PointRow]) {
+        let Layout { patches, rolls, driven } = self.layout;
+        let material = self.material(number, self.detector.pair(slot.world, slot.pair));
+        let (points, patch) = own.split_at_mut(contact.point_count as usize);
+        if patches {
+            let inverse = [contact.body_a, contact.body_b].map(|i| InverseMass::of(&self.masses[i as usize]));
+            let effective = EffectiveMass { inverse: &inverse, row: contact };
+            patch[0] = if rolls { rolling_of(&effective, &material) } else { patch_of(&effective, points) };
+        }
+        if driven {
+            let (tangent_1, tangent_2) = contact.tangents();
+            for point in if self.layout.is_at_patch() { &mut patch[..1] } else { points } {
+                point.slip_1 = material.surface_velocity.dot(tangent_1);
+                point.slip_2 = material.surface_velocity.dot(tangent_2);
+            }
+        }
+    }
+
+    /// The material of the contact in a row.
+    fn material(&self, number: usize, pair: &Pair) -> Material {
+        let bodies = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
+        let hooked = self.hooked.get(number).copied().flatten();
+        hooked.unwrap_or_else(|| Body::contact_material(bodies, pair.colliders))
+    }
+
     fn prepare(&self, rows: &mut SlotRows, slots: &[u32], preparation: Preparation) {
         let rows = Prepare {
-            stride: points_a_slot(self.patches),
+            stride: points_a_slot(self.layout.patches),
             masses: self.masses,
             poses: self.poses,
             preload: &self.carry.preload,
@@ -170,7 +198,7 @@ impl Writer<'_> {
 
     /// Writes the values of a slot that do not follow from other rows.
     fn write_slot(&self, slot: &Slot, (number, i): (usize, usize), rows: &mut SlotRows) {
-        let stride = points_a_slot(self.patches);
+        let stride = points_a_slot(self.layout.patches);
         let contact = &mut rows.contacts[i];
         let pair = self.detector.pair(slot.world, slot.pair);
         let manifold = &pair.manifolds[slot.manifold as usize];
@@ -204,9 +232,7 @@ impl Writer<'_> {
     }
 
     fn write_header(&self, row: &mut ContactRow, (number, slot): (usize, &Slot), pair: &Pair, manifold: &Manifold) {
-        let bodies = [pair.body_a, pair.body_b].map(|i| &self.world.bodies[i as usize]);
-        let hooked = self.hooked.get(number).copied().flatten();
-        let material = hooked.unwrap_or_else(|| Body::contact_material(bodies, pair.colliders));
+        let material = self.material(number, pair);
         *row = ContactRow {
             friction: if self.config.friction_rule() == FrictionRule::None { 0.0 } else { material.friction },
             restitution: material.restitution,
@@ -242,7 +268,7 @@ impl Writer<'_> {
                 *impulse = retangented(before, now, &old[from as usize]);
             }
         }
-        if self.patches {
+        if self.layout.patches {
             impulses[manifold.points().len()] = retangented(before, now, &old[before.point_count as usize]);
         }
     }
@@ -266,7 +292,7 @@ impl Writer<'_> {
         let pull = (pull_b - pull_a).dot(normal);
         point.approach_velocity =
             velocity_at_impact(u.dot(normal), pull, point.separation, self.substep * self.share(row), row.restitution);
-        if self.config.friction_rule() == FrictionRule::Slip && !self.patches {
+        if self.config.friction_rule() == FrictionRule::Slip && !self.layout.patches {
             let (tangent_1, tangent_2) = row.tangents();
             // A point that does not slip yet takes the first tangent.
             let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);
@@ -316,6 +342,17 @@ fn velocity_at_impact(vn: f32, pull: f32, gap: f32, h: f32, e: f32) -> f32 {
 pub(super) fn speed_at_impact(vn: f32, pull: f32, gap: f32, ahead: f32) -> f32 {
     let approach = (vn + ahead).min(0.0);
     (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt()
+}
+
+/// The row that resists the relative spin of two bodies.
+fn rolling_of(effective: &EffectiveMass, material: &Material) -> PointRow {
+    PointRow {
+        normal_mass: effective.twist(),
+        tangent_mass: effective.rolling(),
+        slip_1: material.spinning_friction,
+        slip_2: material.rolling_friction,
+        ..PointRow::default()
+    }
 }
 
 /// The row for the joint friction of all `points`. It also writes their distances from the patch.

@@ -222,7 +222,7 @@ impl Structure {
     /// Adds the impulses of a substep and the preloads to the rows.
     fn write(&self, config: &SolverConfig, substep: f32, contacts: &ContactRows, problem: &mut StepProblem) {
         let has_preloads = config.stabilization == Stabilization::Soft && config.preload_rate > 0.0;
-        let has_patches = problem.has_patches();
+        let is_at_patch = problem.has_friction_at_patches();
         for (i, bearing) in self.bearings.iter().enumerate() {
             let forces = &self.forces[self.points_of(i..i + 1)];
             if forces.iter().all(|force| force[0] == 0.0) {
@@ -239,7 +239,7 @@ impl Structure {
             for ((impulse, force), row) in impulses.iter_mut().zip(forces).zip(rows) {
                 let [normal, tangent_1, tangent_2] = force.map(|force| (force * length) as f32);
                 impulse.normal += normal;
-                let friction = if has_patches { &mut patch[0] } else { impulse };
+                let friction = if is_at_patch { &mut patch[0] } else { impulse };
                 friction.tangent_1 += tangent_1;
                 friction.tangent_2 += tangent_2;
                 pressed += normal;

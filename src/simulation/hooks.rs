@@ -5,8 +5,10 @@ use glam::Vec3;
 use super::events::ColliderOf;
 use super::stages::{Stages, collider_of};
 use crate::collide::{MAX_POINTS, Manifold, Pair};
+use crate::config::SolverConfig;
 use crate::error::Result;
 use crate::panics::blaming;
+use crate::problem::check_material;
 use crate::world::{Body, Material, World};
 
 /// Decides within a step which colliders touch, and how. See [`Simulation::set_hooks`](crate::Simulation::set_hooks).
@@ -114,6 +116,13 @@ pub struct PendingContact {
     pub friction: f32,
     /// Ratio of separation to approach velocity, 0 to 1. The step fails if it is out of range.
     pub restitution: f32,
+    /// Lever of rolling friction (m), 0 or more: see [`Material::rolling_friction`].
+    pub rolling_friction: f32,
+    /// Lever of spinning friction (m), 0 or more.
+    pub spinning_friction: f32,
+    /// Velocity of b's surface relative to a's, beyond that of the bodies, world axes (m/s): see
+    /// [`Material::surface_velocity`].
+    pub surface_velocity: Vec3,
     points: [PendingPoint; MAX_POINTS],
     count: usize,
 }
@@ -143,8 +152,19 @@ impl PendingContact {
             point.separation = (on_b - on_a).dot(manifold.normal);
         }
         let [a, b] = [0, 1].map(|side| collider_of(world, (bodies[side], pair.colliders[side])));
-        let Material { friction, restitution, .. } = material;
-        Self { a, b, normal: manifold.normal, friction, restitution, points, count: manifold.points().len() }
+        let Material { friction, restitution, rolling_friction, spinning_friction, surface_velocity, .. } = material;
+        Self {
+            a,
+            b,
+            normal: manifold.normal,
+            friction,
+            restitution,
+            rolling_friction,
+            spinning_friction,
+            surface_velocity,
+            points,
+            count: manifold.points().len(),
+        }
     }
 
     /// The contact points, 1 to 4.
@@ -175,6 +195,7 @@ impl Stages {
     pub(super) fn modify_contacts(
         &mut self,
         world: &World,
+        config: &SolverConfig,
         hooks: Option<&mut (dyn ContactHooks + 'static)>,
     ) -> Result<Modified> {
         let Self { detector, contacts, .. } = self;
@@ -193,9 +214,18 @@ impl Stages {
                 let material = Body::contact_material(bodies.map(|i| &world.bodies[i as usize]), pair.colliders);
                 let mut contact = PendingContact::of(world, pair, manifold, material);
                 blaming(bodies, || hooks.modify(world, &mut contact));
-                let PendingContact { friction, restitution, .. } = contact;
-                let hooked = Material { friction, restitution, ..material };
-                hooked.check().map_err(|error| {
+                let PendingContact {
+                    friction, restitution, rolling_friction, spinning_friction, surface_velocity, ..
+                } = contact;
+                let hooked = Material {
+                    friction,
+                    restitution,
+                    rolling_friction,
+                    spinning_friction,
+                    surface_velocity,
+                    ..material
+                };
+                hooked.check().and_then(|()| check_material(config, &hooked)).map_err(|error| {
                     let [a, b] = bodies.map(|i| world.name_of(i as usize));
                     error.within(format_args!("the hooks, of the contact of {a} and {b}"))
                 })?;

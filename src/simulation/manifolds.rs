@@ -34,8 +34,10 @@ pub struct SolvedManifold {
     pub color: Option<u8>,
     /// Compression of the contact springs when the surfaces just touch (m).
     pub preload: f32,
-    /// Torsional impulse about the normal, with friction per manifold (N m s).
+    /// Torsional impulse about the normal, with friction per manifold or spinning friction (N m s).
     pub twist_impulse: f32,
+    /// Impulse of rolling friction on b in the last substep, about the tangents, world axes (N m s).
+    pub rolling_impulse: Vec3,
     /// Friction impulse on b in the last substep, with friction per manifold, world axes (N s).
     pub friction_impulse: Vec3,
     /// Impulse on b over the whole step: normal and friction of all points, in world axes (N s). It is `None` if the
@@ -159,7 +161,6 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
         }
         summed = Some(problem.total_impulse(contact));
     }
-    // With friction per manifold, the row after the points belongs to the patch.
     let patch = if problem.has_patches() { problem.impulses[first + count] } else { ImpulseRow::default() };
     SolvedManifold {
         substeps: (1.0 / contact.substep_share) as u32,
@@ -169,7 +170,8 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
         color: contacts.color_of(manifold.slot),
         preload: contact.preload,
         twist_impulse: patch.normal,
-        friction_impulse: friction(&patch),
+        friction_impulse: if problem.has_friction_at_patches() { friction(&patch) } else { Vec3::ZERO },
+        rolling_impulse: if problem.has_friction_at_patches() { Vec3::ZERO } else { friction(&patch) },
         summed,
         points,
         count,

@@ -8,7 +8,7 @@ use super::by_body::ByBody;
 use super::events::{ColliderOf, Event, Events, Hit, Met};
 use super::hooks::ContactHooks;
 use crate::collide::{Activity, ColliderSide, DetectStats, Detector, PairFilter};
-use crate::config::SolverConfig;
+use crate::config::{FrictionAt, FrictionRule, SolverConfig};
 use crate::effort::Effort;
 use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
@@ -214,8 +214,12 @@ impl Stages {
         if joints {
             world.check_joints()?;
         }
+        let settings = self.key.config != *config;
+        if surfaces || !bodies.is_empty() {
+            check_materials(world, config)?;
+        }
         let step = self.key.scale.is_some_and(|scale| scale != StepScale::new(config, dt));
-        Ok(Changes { bodies, settings: self.key.config != *config, surfaces, joints, step })
+        Ok(Changes { bodies, settings, surfaces, joints, step })
     }
 
     /// Substeps of class 0 in the last step.
@@ -327,7 +331,7 @@ impl Stages {
             }
             found
         });
-        let modified = self.modify_contacts(world, hooks)?;
+        let modified = self.modify_contacts(world, config, hooks)?;
         if modified.materials {
             self.plan_key = None;
         }
@@ -473,6 +477,17 @@ impl Stages {
         self.sleep.after_step(world, &self.detector, &self.key.config, dt);
         taken
     }
+}
+
+/// Refuses materials that the settings cannot follow.
+pub(super) fn check_materials(world: &World, config: &SolverConfig) -> Result<()> {
+    if config.friction_at == FrictionAt::Points && config.friction_rule() != FrictionRule::Slip {
+        return Ok(());
+    }
+    world.bodies.iter().enumerate().try_for_each(|(i, body)| {
+        let check = |material| problem::check_material(config, &material);
+        body.materials().try_for_each(check).map_err(|error| error.within(world.name_of(i)))
+    })
 }
 
 /// The bodies whose pose, velocity or loads are out of range, in ascending order.

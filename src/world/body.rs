@@ -94,13 +94,39 @@ pub struct Material {
     pub friction_rule: Option<CombineRule>,
     /// How contacts combine restitution: by the larger value if neither material has a rule. `None` by default.
     pub restitution_rule: Option<CombineRule>,
+    /// Lever of rolling friction (m), 0 or more: a contact with the normal force N resists rolling by a torque of up to
+    /// N times the lever. A ball of radius r that rolls on a level floor slows down by 5/7 g times the lever over r.
+    /// The larger value of two materials counts. 0 by default.
+    pub rolling_friction: f32,
+    /// Lever of spinning friction (m), 0 or more: the same for spin about the normal of the contact.
+    pub spinning_friction: f32,
+    /// Velocity of the surface relative to the body, as of a belt, in the axes of the body (m/s). Friction takes along
+    /// bodies that touch the surface; the body itself does not move by it. Zero by default. Only the components along
+    /// the surface act.
+    pub surface_velocity: Vec3,
 }
 
-crate::saved::fields!(Material { friction, restitution, friction_rule, restitution_rule });
+crate::saved::fields!(Material {
+    friction,
+    restitution,
+    friction_rule,
+    restitution_rule,
+    rolling_friction,
+    spinning_friction,
+    surface_velocity,
+});
 
 impl Default for Material {
     fn default() -> Self {
-        Self { friction: 0.5, restitution: 0.0, friction_rule: None, restitution_rule: None }
+        Self {
+            friction: 0.5,
+            restitution: 0.0,
+            friction_rule: None,
+            restitution_rule: None,
+            rolling_friction: 0.0,
+            spinning_friction: 0.0,
+            surface_velocity: Vec3::ZERO,
+        }
     }
 }
 
@@ -110,18 +136,38 @@ impl Material {
         let Self { friction, restitution, .. } = *self;
         let is_friction = friction >= 0.0 && friction.is_finite();
         ensure(is_friction, || format!("friction = {friction}: must be 0 or more"))?;
-        ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))
+        ensure((0.0..=1.0).contains(&restitution), || format!("restitution = {restitution}: must be 0 to 1"))?;
+        for (name, lever) in
+            [("rolling_friction", self.rolling_friction), ("spinning_friction", self.spinning_friction)]
+        {
+            ensure(lever >= 0.0 && lever.is_finite(), || format!("{name} = {lever} m: must be 0 or more"))?;
+        }
+        ensure(is_within(self.surface_velocity, MAX_SPEED), || {
+            format!("surface_velocity = {} m/s: must be at most {MAX_SPEED:e}", self.surface_velocity)
+        })
     }
 
-    /// The material of a contact between `self` and `other`. It has no rules.
+    /// Whether the surface resists rolling or spinning.
+    pub(crate) fn rolls(&self) -> bool {
+        self.rolling_friction > 0.0 || self.spinning_friction > 0.0
+    }
+
+    /// Whether the surface moves by itself.
+    pub(crate) fn is_driven(&self) -> bool {
+        self.surface_velocity != Vec3::ZERO
+    }
+
+    /// The material of a contact between `self` and `other`. It has no rules, and no surface velocity: that depends on
+    /// the rotations of the bodies.
     pub fn combine(self, other: Self) -> Self {
         let friction = self.friction_rule.max(other.friction_rule).unwrap_or(CombineRule::GeometricMean);
         let restitution = self.restitution_rule.max(other.restitution_rule).unwrap_or(CombineRule::Maximum);
         Self {
             friction: friction.of(self.friction, other.friction),
             restitution: restitution.of(self.restitution, other.restitution),
-            friction_rule: None,
-            restitution_rule: None,
+            rolling_friction: self.rolling_friction.max(other.rolling_friction),
+            spinning_friction: self.spinning_friction.max(other.spinning_friction),
+            ..Self::default()
         }
     }
 }
@@ -257,6 +303,15 @@ pub struct Body {
     /// them. About the other axes the body rotates as on bearings, by its inertia about those axes, and without
     /// gyroscopic torque. Only for dynamic bodies; no axis is locked by default.
     pub locked_rotations: [bool; 3],
+    /// The world axes x, y, z along which the center of mass does not move. The next step removes any velocity along
+    /// them. Forces along them do nothing, and contacts bear on the body along them as on a fixed one. Only for dynamic
+    /// bodies; no axis is locked by default.
+    pub locked_translations: [bool; 3],
+    /// Largest speed of the center of mass (m/s), 0 or more; infinite by default. Each step begins and ends with at most
+    /// this speed. Only for dynamic bodies.
+    pub max_linear_speed: f32,
+    /// Largest angular speed (rad/s), 0 or more, likewise.
+    pub max_angular_speed: f32,
     /// Whether the body may fall asleep; true by default. A body that may not sleep keeps all bodies awake that touch
     /// it or are joined to it. Only for dynamic bodies.
     pub can_sleep: bool,
@@ -294,6 +349,9 @@ crate::saved::cloned!(Body {
     linear_damping,
     angular_damping,
     locked_rotations,
+    locked_translations,
+    max_linear_speed,
+    max_angular_speed,
     can_sleep,
     mass,
     material,
@@ -311,10 +369,11 @@ crate::saved::cloned!(Body {
 pub(crate) struct Surface {
     pub mass: MassProperties,
     pub locked_rotations: [bool; 3],
+    pub locked_translations: [bool; 3],
     pub material: Material,
 }
 
-crate::saved::fields!(Surface { mass, locked_rotations, material });
+crate::saved::fields!(Surface { mass, locked_rotations, locked_translations, material });
 
 /// Where the mass of a body comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -325,6 +384,11 @@ enum Weight {
     Total(f32),
     /// From the caller, for any shapes.
     Given,
+}
+
+/// A vector without its components along locked axes.
+fn without([x, y, z]: [bool; 3], vector: Vec3) -> Vec3 {
+    Vec3::select(glam::BVec3::new(x, y, z), Vec3::ZERO, vector)
 }
 
 impl Saved for Weight {
@@ -380,6 +444,9 @@ impl Body {
             linear_damping,
             angular_damping,
             locked_rotations,
+            locked_translations,
+            max_linear_speed,
+            max_angular_speed,
             can_sleep,
             mass,
             material,
@@ -400,6 +467,9 @@ impl Body {
         linear_damping.walk(archive)?;
         angular_damping.walk(archive)?;
         locked_rotations.walk(archive)?;
+        locked_translations.walk(archive)?;
+        max_linear_speed.walk(archive)?;
+        max_angular_speed.walk(archive)?;
         can_sleep.walk(archive)?;
         mass.walk(archive)?;
         material.walk(archive)?;
@@ -432,6 +502,9 @@ impl Body {
             linear_damping: 0.0,
             angular_damping: 0.0,
             locked_rotations: [false; 3],
+            locked_translations: [false; 3],
+            max_linear_speed: f32::INFINITY,
+            max_angular_speed: f32::INFINITY,
             can_sleep: true,
             mass: MassProperties::IMMOVABLE,
             material: Material::default(),
@@ -647,6 +720,48 @@ impl Body {
         self
     }
 
+    /// Locks translation along some world axes: x, y, z. See [the field](Body#structfield.locked_translations).
+    ///
+    /// ```
+    /// use drystone::{Body, Shape, Simulation, World};
+    ///
+    /// // A body of a plane world moves along x and y, and rotates about z.
+    /// let flat = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
+    /// let flat = flat.locked_translations([false, false, true]).locked_rotations([true, true, false]);
+    /// let mut world = World::new();
+    /// let flat = world.insert(flat.velocity([1.0, 2.0, 3.0].into(), [1.0, 1.0, 1.0].into()));
+    /// let mut simulation = Simulation::new(world)?;
+    /// simulation.step(1.0 / 60.0)?;
+    /// let body = simulation.world.body(flat).expect("it is there");
+    /// assert_eq!((body.position.z, body.linear_velocity.z, body.linear_velocity.x), (0.0, 0.0, 1.0));
+    /// assert!(body.has_locked_axis());
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn locked_translations(mut self, axes: [bool; 3]) -> Self {
+        self.locked_translations = axes;
+        self
+    }
+
+    /// Sets the largest speed of the center of mass (m/s) and the largest angular speed (rad/s): see [the
+    /// field](Body#structfield.max_linear_speed).
+    ///
+    /// ```
+    /// use drystone::{Body, Shape, Simulation, World, glam::Vec3};
+    ///
+    /// let mut world = World::new();
+    /// let fast = Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X * 100.0, Vec3::Y * 100.0);
+    /// let fast = world.insert(fast.max_speeds(20.0, 5.0));
+    /// let mut simulation = Simulation::new(world)?;
+    /// simulation.step(1.0 / 60.0)?;
+    /// let body = simulation.world.body(fast).expect("it is there");
+    /// assert!(body.linear_velocity.length() <= 20.0 && body.angular_velocity == Vec3::Y * 5.0);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn max_speeds(mut self, linear: f32, angular: f32) -> Self {
+        (self.max_linear_speed, self.max_angular_speed) = (linear, angular);
+        self
+    }
+
     /// Sets whether the body may fall asleep: [the field](Body#structfield.can_sleep).
     pub fn can_sleep(mut self, can: bool) -> Self {
         self.can_sleep = can;
@@ -760,6 +875,9 @@ impl Body {
             linear_damping,
             angular_damping,
             locked_rotations,
+            locked_translations,
+            max_linear_speed,
+            max_angular_speed,
             can_sleep,
             mass,
             material,
@@ -774,6 +892,8 @@ impl Body {
         (name, kind, mass, gravity_scale) == (&other.name, &other.kind, &other.mass, &other.gravity_scale)
             && (linear_damping, angular_damping) == (&other.linear_damping, &other.angular_damping)
             && (locked_rotations, can_sleep) == (&other.locked_rotations, &other.can_sleep)
+            && *locked_translations == other.locked_translations
+            && (max_linear_speed, max_angular_speed) == (&other.max_linear_speed, &other.max_angular_speed)
             && (material, groups, swept, weight) == (&other.material, &other.groups, &other.swept, &other.weight)
             && *additional == other.additional
             && self.has_same_colliders(other)
@@ -810,18 +930,52 @@ impl Body {
         self.kind == BodyKind::Dynamic && self.locked_rotations == [true; 3]
     }
 
-    /// The part of an angular velocity about the axes that are not locked.
+    /// The part of an angular velocity about the axes that are not locked, up to the largest angular speed.
     pub(crate) fn allowed_spin(&self, spin: Vec3) -> Vec3 {
-        if !self.has_locked_rotation() {
-            return spin;
-        }
-        let [x, y, z] = self.locked_rotations;
-        Vec3::select(glam::BVec3::new(x, y, z), Vec3::ZERO, spin)
+        let spin = if self.has_locked_rotation() { without(self.locked_rotations, spin) } else { spin };
+        self.at_most(self.max_angular_speed, spin)
     }
 
-    /// The material of the contact of two bodies, at colliders of these indices.
+    /// The part of a velocity along the axes that are not locked, up to the largest speed.
+    pub(crate) fn allowed_velocity(&self, velocity: Vec3) -> Vec3 {
+        self.at_most(self.max_linear_speed, self.unlocked(velocity))
+    }
+
+    /// The part of a vector along the axes that are not locked.
+    pub(crate) fn unlocked(&self, vector: Vec3) -> Vec3 {
+        if self.has_locked_translation() { without(self.locked_translations, vector) } else { vector }
+    }
+
+    fn at_most(&self, speed: f32, velocity: Vec3) -> Vec3 {
+        let is_capped = speed < f32::INFINITY && self.kind == BodyKind::Dynamic;
+        if is_capped { velocity.clamp_length_max(speed) } else { velocity }
+    }
+
+    /// Whether the body is dynamic and translation along a world axis is locked.
+    pub(crate) fn has_locked_translation(&self) -> bool {
+        self.locked_translations != [false; 3] && self.kind == BodyKind::Dynamic
+    }
+
+    /// Whether the body is dynamic and any of its axes is locked.
+    pub fn has_locked_axis(&self) -> bool {
+        self.has_locked_rotation() || self.has_locked_translation()
+    }
+
+    /// The locked translations as the number of a row.
+    pub(crate) fn locks(&self) -> f32 {
+        let [x, y, z] = self.locked_translations.map(u8::from);
+        f32::from(x + 2 * y + 4 * z)
+    }
+
+    /// The material of the contact of two bodies, at colliders of these indices. Its surface velocity is that of b's
+    /// surface relative to a's, beyond the motion of the bodies, in world axes.
     pub(crate) fn contact_material([a, b]: [&Self; 2], colliders: [u32; 2]) -> Material {
-        a.material_of(colliders[0]).combine(b.material_of(colliders[1]))
+        let [of_a, of_b] = [a.material_of(colliders[0]), b.material_of(colliders[1])];
+        let both = of_a.combine(of_b);
+        if !of_a.is_driven() && !of_b.is_driven() {
+            return both;
+        }
+        Material { surface_velocity: b.rotation * of_b.surface_velocity - a.rotation * of_a.surface_velocity, ..both }
     }
 
     fn material_of(&self, collider: u32) -> Material {
@@ -835,7 +989,8 @@ impl Body {
 
     /// The properties for which its rows are written, in addition to its shapes.
     pub(crate) fn surface(&self) -> Surface {
-        Surface { mass: self.mass, locked_rotations: self.locked_rotations, material: self.material }
+        let &Self { mass, locked_rotations, locked_translations, material, .. } = self;
+        Surface { mass, locked_rotations, locked_translations, material }
     }
 
     /// Inverse inertia in world axes (1/(kg m²)): the inverse of the inertia about the axes that are not locked, and
@@ -1043,6 +1198,11 @@ impl Body {
             ensure((0.0..=MAX_DAMPING).contains(&rate), || {
                 format!("{name} = {rate}: must be 0 to {MAX_DAMPING:e} 1/s")
             })?;
+        }
+        for (name, speed) in
+            [("max_linear_speed", self.max_linear_speed), ("max_angular_speed", self.max_angular_speed)]
+        {
+            ensure(speed >= 0.0, || format!("{name} = {speed}: must be 0 or more"))?;
         }
         let scale = self.gravity_scale;
         ensure(scale.abs() <= MAX_GRAVITY, || {

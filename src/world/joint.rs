@@ -1,5 +1,7 @@
 //! Joints: they restrict the relative motion of two bodies.
 
+use std::f32::consts::PI;
+
 use glam::{Quat, Vec3};
 
 use super::bodies::BodyHandle;
@@ -206,6 +208,43 @@ impl Joint {
     /// two bodies from colliding.
     pub fn generic(self, linear: [Axis; 3], angular: [Axis; 3]) -> Self {
         self.of_kind(Linear::Axes(linear), angular)
+    }
+
+    /// A second joint for the same two bodies, which keeps their first axes ([`Self::along`]) within a cone: the angle
+    /// between the axes is at most `angle` (rad), more than 0 and less than pi. It is a rope between the ends of the
+    /// axes, as long as the chord of the angle. A shoulder is a ball joint and its cone.
+    ///
+    /// ```
+    /// use drystone::{Body, Joint, Shape, Simulation, World, glam::Vec3};
+    ///
+    /// // An arm that hangs down, and is pulled to all sides with twice its weight.
+    /// let mut world = World::new();
+    /// let arm = world.insert(Body::dynamic().shape(Shape::capsule(0.3, 0.1)).position(0.0, -0.5, 0.0));
+    /// let shoulder = Joint::to_world(arm, Vec3::Y * 0.5, Vec3::ZERO).along(Vec3::Y);
+    /// world.insert_joint(shoulder);
+    /// world.insert_joint(shoulder.cone(0.4));
+    /// let mut simulation = Simulation::new(world)?;
+    /// for side in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::new(0.6, 0.0, 0.8)] {
+    ///     for _ in 0..120 {
+    ///         let arm = simulation.world.body_mut(arm).expect("it is there");
+    ///         (arm.force, arm.angular_damping) = (side * 2.0 * 9.81 * arm.mass.mass, 5.0);
+    ///         simulation.step(1.0 / 60.0)?;
+    ///     }
+    ///     let body = simulation.world.body(arm).expect("it is there");
+    ///     let angle = (body.rotation * Vec3::Y).angle_between(Vec3::Y);
+    ///     assert!((angle - 0.4).abs() < 2e-3, "{angle} rad");
+    /// }
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn cone(&self, angle: f32) -> Self {
+        // The axes are as long as the longer arm, so that the ends move as fast as the bodies.
+        let arms = self.anchor_a.length().max(if self.body_b.is_some() { self.anchor_b.length() } else { 0.0 });
+        let length = if arms > 0.0 { arms } else { 1.0 };
+        let end = |anchor: Vec3, frame: Quat| anchor + frame * (Vec3::X * length);
+        let (anchor_a, anchor_b) = (end(self.anchor_a, self.frame_a), end(self.anchor_b, self.frame_b));
+        // A chord of an angle out of range is a length that no rope has.
+        let chord = if angle > 0.0 && angle < PI { 2.0 * length * libm::sinf(0.5 * angle) } else { f32::NAN };
+        Self { anchor_a, anchor_b, ..*self }.rope(chord)
     }
 
     /// Changes the kind of the joint. Settings that the ball joint already had move to the first axis, so calls can

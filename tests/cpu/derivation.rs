@@ -55,7 +55,11 @@ impl Case {
     }
 
     fn masses(&self) -> [InverseMass; 2] {
-        [0, 1].map(|i| InverseMass { mass: self.inverse_mass[i] as f32, inertia: self.inverse_inertia[i].as_mat3() })
+        [0, 1].map(|i| InverseMass {
+            mass: self.inverse_mass[i] as f32,
+            locks: 0.0,
+            inertia: self.inverse_inertia[i].as_mat3(),
+        })
     }
 
     fn contact_row(&self) -> ContactRow {
@@ -72,6 +76,7 @@ impl Case {
             Body { dp: lane(dp), dq: Quat { axis: vec3(q.x, q.y, q.z), w: q.w }, ..Body::default() }
         };
         let mass = |i: usize| Mass {
+            locks: 0.0,
             inv_inertia: symmetric(&self.inverse_inertia[i]),
             inv_mass: self.inverse_mass[i],
             acceleration: lane(DVec3::ZERO),
@@ -174,8 +179,8 @@ fn friction_jams_a_rod_as_painleve_says() {
         let (sin, cos) = angle.sin_cos();
         let along = Vec3::new(cos, sin, 0.0);
         let across = Mat3::IDENTITY - Mat3::from_cols(along * along.x, along * along.y, along * along.z);
-        let rod = InverseMass { mass: 2.0, inertia: across * (2.0 * 3.0) };
-        let floor = InverseMass { mass: 0.0, inertia: Mat3::ZERO };
+        let rod = InverseMass { mass: 2.0, locks: 0.0, inertia: across * (2.0 * 3.0) };
+        let floor = InverseMass { mass: 0.0, locks: 0.0, inertia: Mat3::ZERO };
         let row = ContactRow { friction: mu, ..ContactRow::framed(Vec3::Y) };
         EffectiveMass { inverse: &[floor, rod], row: &row }.jamming(Vec3::ZERO, -along)
     };

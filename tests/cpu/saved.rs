@@ -143,6 +143,28 @@ fn bodies_with_materials_of_shapes_go_on_to_the_same_bits() {
     goes_on("painted", &scene("pile-mixed", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40, 50, 51], paint);
 }
 
+/// The same of belts, on bodies that turn, and of rolling friction that comes and goes.
+#[test]
+fn belts_and_rolling_friction_go_on_to_the_same_bits() {
+    let paint = |step: u32, world: &mut World| {
+        if step == 12 || step == 50 {
+            for (k, body) in world.bodies.iter_mut().enumerate() {
+                body.material.surface_velocity = if k % 3 == 0 { Vec3::new(0.3, -0.2, 0.5) } else { Vec3::ZERO };
+                body.material.rolling_friction = if step == 12 && k % 2 == 0 { 0.02 } else { 0.0 };
+                body.material.spinning_friction = if step == 12 && k % 5 == 0 { 0.01 } else { 0.0 };
+            }
+        }
+    };
+    goes_on("belts", &scene("pile-mixed", &["n=40"]), &SolverConfig::default(), 90, &[11, 12, 13, 40, 50, 51], paint);
+    let patches = SolverConfig::default().with(|c| c.friction_at = FrictionAt::Manifold);
+    let belts = |step: u32, world: &mut World| {
+        if step == 12 {
+            world.bodies[0].material.surface_velocity = Vec3::X;
+        }
+    };
+    goes_on("belts at patches", &scene("pile", &["n=40"]), &patches, 60, &[11, 12, 13, 40], belts);
+}
+
 #[test]
 fn islands_of_higher_effort_go_on_to_the_same_bits() {
     let world = scene("mass-ratio", &[]);

@@ -45,6 +45,7 @@ tests! {
 const MEASURED: Rules = Rules {
     biased: true,
     friction: FrictionRule::Disc,
+    rolls: false,
     patch: false,
     friction_first: false,
     accumulated: true,
@@ -80,10 +81,10 @@ fn problems(seed: u64) -> [StepProblem; 2] {
 fn triples(kernel: Kernel) -> HashSet<[(usize, u8); 3]> {
     let Some(rules) = kernel.rules() else { return HashSet::new() };
     let Rules { biased, friction, patch, friction_first, accumulated, round, as_one, driven, .. } = rules;
-    let Rules { passes, measured, from_start, isotropic, bounces, axes, .. } = rules;
+    let Rules { passes, measured, from_start, isotropic, bounces, axes, rolls, .. } = rules;
     let values = [
         [biased, patch, friction_first, accumulated, round, as_one, driven].map(u8::from).to_vec(),
-        [measured, from_start, isotropic, bounces, axes].map(u8::from).to_vec(),
+        [measured, from_start, isotropic, bounces, axes, rolls].map(u8::from).to_vec(),
         vec![friction as u8, passes],
     ];
     let values: Vec<_> = values.concat().into_iter().enumerate().collect();

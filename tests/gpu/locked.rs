@@ -1,21 +1,28 @@
 //! Bodies that turn about some axes of the world only.
 
-use crate::common::state::reference;
+use crate::common::state::{all_bits, reference};
 use crate::common::{Open, gpu};
 use drystone::glam::{DVec3, Mat3, Quat, Vec3};
 use drystone::{Body, Cpu, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
 
 tests! {
     every_backend {
+        a_body_with_locked_translations_stays_in_its_plane,
+        contacts_bear_on_a_locked_body_as_on_a_fixed_one,
+        a_cart_on_a_rail_and_its_pendulum_swing_as_on_paper,
+        no_body_ends_a_step_faster_than_its_largest_speeds,
         a_body_with_locked_rotations_never_turns,
         bodies_of_a_plane_turn_about_its_normal_only,
         a_board_turns_about_the_free_axis_as_on_bearings,
         a_hit_beside_the_center_of_a_locked_body_is_a_central_one,
     }
     exact_gpu {
+        a_gpu_has_the_bits_of_the_reference_with_locked_translations,
         a_gpu_has_the_bits_of_the_reference_with_locked_axes,
     }
     no_gpu {
+        lanes_have_the_bits_of_the_reference_with_locked_translations,
+        the_law_of_energy_holds_bodies_with_locked_axes,
         lanes_have_the_bits_of_the_reference_with_locked_axes,
         free_axes_keep_their_momentum,
         axes_that_a_caller_locks_stop_in_the_next_step,
@@ -44,16 +51,6 @@ fn after(world: World, substeps: u32, steps: u32, open: Open) -> World {
     let mut simulation = simulation(world, substeps, open);
     (0..steps).for_each(|_| drop(simulation.step(DT).expect("a step")));
     simulation.world
-}
-
-/// Every bit of every pose and velocity.
-fn bits(world: &World) -> Vec<[u32; 13]> {
-    let of = |b: &Body| {
-        let ([px, py, pz], [vx, vy, vz]) = (b.position.to_array(), b.linear_velocity.to_array());
-        let ([wx, wy, wz], [qx, qy, qz, qw]) = (b.angular_velocity.to_array(), b.rotation.to_array());
-        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz].map(f32::to_bits)
-    };
-    world.bodies.iter().map(of).collect()
 }
 
 /// Boards that fall on an edge, balls that hit them beside their middle, and a pendulum, with the axes of each locked that `axes` gives.
@@ -147,7 +144,7 @@ fn alternating(k: usize) -> [bool; 3] {
 fn same_as_the_reference(open: Open) {
     for substeps in [8, 32] {
         let [ours, theirs] = [reference, open].map(|open| after(mixture(alternating), substeps, 40, open));
-        assert_eq!(bits(&ours), bits(&theirs), "{substeps} substeps");
+        assert_eq!(all_bits(&ours), all_bits(&theirs), "{substeps} substeps");
         for body in &ours.bodies {
             assert!((0..3).all(|axis| !body.locked_rotations[axis] || body.angular_velocity[axis] == 0.0));
         }
@@ -223,5 +220,149 @@ fn a_contact_problem_of_locked_bodies_is_refused_by_name() {
         .map(|_| ())
         .expect_err("a lock")
         .to_string();
-    assert_eq!(error, "body 0 \"crate\" has locked rotations: a contact problem cannot have locked rotations");
+    assert_eq!(error, "body 0 \"crate\" has locked axes: a contact problem cannot have locked axes");
+}
+
+/// A pile of boxes and chains between them, all in the plane of x and y, pushed out of it.
+fn plane(joints: bool) -> World {
+    let mut world = World::new();
+    world.add(Body::fixed().shape(Shape::half_space(Vec3::new(0.0, 1.0, 0.2).normalize())));
+    for k in 0..12 {
+        let at = [1.5 * (k % 4) as f32, 0.8 + 1.6 * (k / 4) as f32, 0.02 * k as f32];
+        let body = if k % 3 == 0 { Body::dynamic().shape(Shape::ball(0.4)) } else { cube() };
+        let body = body.position(at[0], at[1], at[2]).rotation(Quat::from_rotation_z(0.2 * k as f32));
+        let body = body.locked_translations([false, false, true]).locked_rotations([true, true, false]);
+        world.add(body.velocity(Vec3::new(1.0, -1.0, 2.0), Vec3::ONE));
+    }
+    if joints {
+        for (a, b) in [(11, 12), (10, 11)] {
+            let [body_a, body_b] = [a, b].map(|i: usize| &world.bodies[i]);
+            let middle = body_a.position.midpoint(body_b.position);
+            let [on_a, on_b] = [body_a, body_b].map(|body| body.rotation.inverse() * (middle - body.position));
+            world.join(Joint::new(a, on_a, b, on_b));
+        }
+    }
+    world
+}
+
+fn a_body_with_locked_translations_stays_in_its_plane(open: Open) {
+    for (joints, substeps) in [(false, 8), (true, 8), (false, 64)] {
+        let before = plane(joints);
+        let world = after(before.clone(), substeps, 120, open);
+        for (body, before) in world.bodies.iter().zip(&before.bodies).skip(1) {
+            assert_eq!((body.position.z.to_bits(), body.linear_velocity.z), (before.position.z.to_bits(), 0.0));
+            assert_eq!((body.angular_velocity.x, body.angular_velocity.y), (0.0, 0.0));
+        }
+        let moved = world.bodies[5].position.distance(before.bodies[5].position);
+        assert!(moved > 0.1 && world.bodies.iter().skip(1).all(|body| body.position.y > 0.2), "{moved}");
+        assert!(world.joint_gap() < 5e-3, "{} m", world.joint_gap());
+    }
+}
+
+/// A locked board of 1 kg bears 20 kg at either end.
+fn contacts_bear_on_a_locked_body_as_on_a_fixed_one(open: Open) {
+    let mut world = World::new();
+    let board = Body::dynamic().shape(Shape::cuboid(2.0, 0.1, 0.5)).total_mass(1.0).position(0.0, 1.0, 0.0);
+    let board = world.add(board.locked_translations([true; 3]).locked_rotations([true; 3]));
+    let crates = [-1.5, 1.5]
+        .map(|x| world.add(Body::dynamic().shape(Shape::cuboid(0.3, 0.3, 0.3)).total_mass(20.0).position(x, 1.4, 0.0)));
+    let world = after(world, 8, 120, open);
+    assert_eq!(world.bodies[board].position, Vec3::Y);
+    for body in crates.map(|i| &world.bodies[i]) {
+        assert!((body.position.y - 1.4).abs() < 2e-3, "{}", body.position);
+        assert!(body.linear_velocity.length() < 1e-2, "{}", body.linear_velocity);
+    }
+}
+
+/// A cart of M on a rail along x, with a pendulum of a point mass m at the length l, swings with w² = (1 + m/M) g/l, here
+/// for m = M.
+fn a_cart_on_a_rail_and_its_pendulum_swing_as_on_paper(open: Open) {
+    let mut world = World::new();
+    let rail = cube().total_mass(1.0).locked_translations([false, true, true]).locked_rotations([true; 3]);
+    let cart = world.add(rail);
+    let swing = Quat::from_rotation_z(0.02);
+    let at = swing * Vec3::NEG_Y;
+    let bob = Body::dynamic().shape(Shape::ball(0.05)).total_mass(1.0).position(at.x, at.y, 0.0).rotation(swing);
+    let bob = world.add(bob);
+    world.join(Joint::new(bob, Vec3::Y, cart, Vec3::ZERO));
+    world.bodies[cart].position.x = -0.5 * at.x;
+    world.bodies[bob].position.x = 0.5 * at.x;
+    let start = world.bodies[bob].position.x - world.bodies[cart].position.x;
+    let omega = (2.0_f32 * 9.81).sqrt();
+    let config = SolverConfig::default().without_sleep();
+    let mut simulation = Simulation::with(world, config, open()).expect("a simulation");
+    let (mut worst, mut gap) = (0.0_f32, 0.0_f32);
+    for step in 1..=60 {
+        simulation.step(DT).expect("a step");
+        let [at_cart, at_bob] = [cart, bob].map(|i| simulation.world.bodies[i].position);
+        worst = worst.max((at_bob.x - at_cart.x - start * (omega * DT * step as f32).cos()).abs());
+        gap = gap.max(simulation.world.joint_gap());
+        assert_eq!((at_cart.y, at_cart.z), (0.0, 0.0));
+    }
+    assert!(worst < 0.08 * start.abs() && gap < 1e-3, "{worst} m of {start}, and a gap of {gap} m");
+}
+
+fn no_body_ends_a_step_faster_than_its_largest_speeds(open: Open) {
+    let mut world = weightless();
+    let fast = world.add(cube().velocity(Vec3::new(30.0, 40.0, 0.0), Vec3::Y * 20.0).max_speeds(10.0, 2.0));
+    let falls = world.add(cube().position(20.0, 0.0, 0.0).max_speeds(5.0, f32::INFINITY));
+    world.bodies[falls].force = Vec3::X * 60.0;
+    let mut simulation = Simulation::with(world, SolverConfig::default(), open()).expect("a simulation");
+    for step in 1..=60 {
+        simulation.step(DT).expect("a step");
+        let [fast, falls] = [fast, falls].map(|i| &simulation.world.bodies[i]);
+        assert!((fast.linear_velocity - Vec3::new(6.0, 8.0, 0.0)).length() < 1e-5, "{}", fast.linear_velocity);
+        assert!((fast.angular_velocity - Vec3::Y * 2.0).length() < 1e-5, "{}", fast.angular_velocity);
+        let wanted = (10.0 * DT * step as f32).min(5.0);
+        assert!((falls.linear_velocity.x - wanted).abs() < 1e-4, "{}, not {wanted}", falls.linear_velocity.x);
+    }
+    // The first step already moves it at that speed.
+    assert!((simulation.world.bodies[fast].position - Vec3::new(6.0, 8.0, 0.0)).length() < 1e-3);
+    simulation.world.bodies[fast].max_linear_speed = -1.0;
+    let error = simulation.step(DT).expect_err("it is refused").to_string();
+    assert!(error.contains("max_linear_speed = -1"), "{error}");
+}
+
+fn same_in_the_plane(open: Open) {
+    for (joints, substeps) in [(false, 8), (true, 8), (true, 64)] {
+        let [ours, theirs] = [reference, open].map(|open| {
+            let config = SolverConfig::default().with(|c| c.substeps = substeps);
+            let mut simulation = Simulation::with(plane(joints), config, open()).expect("a simulation");
+            for step in 0..40 {
+                if step == 20 {
+                    simulation.world.bodies[3].locked_translations = [false; 3];
+                    simulation.world.bodies[4].locked_translations = [true, true, false];
+                }
+                simulation.step(DT).expect("a step");
+            }
+            simulation.world
+        });
+        assert_eq!(all_bits(&ours), all_bits(&theirs), "{joints}, {substeps} substeps");
+    }
+}
+
+fn a_gpu_has_the_bits_of_the_reference_with_locked_translations() {
+    same_in_the_plane(|| Box::new(gpu::exact()));
+}
+
+fn lanes_have_the_bits_of_the_reference_with_locked_translations() {
+    same_in_the_plane(|| Box::new(Cpu::new()));
+}
+
+/// Bodies with locked axes exchange momentum with what locks them. A brake that kept the momentum of their island would
+/// give them a motion that they cannot have.
+fn the_law_of_energy_holds_bodies_with_locked_axes() {
+    let mut world = weightless();
+    for k in 0..2 {
+        let body = cube().position(0.9 * k as f32, 0.0, 0.0).locked_translations([false, true, true]);
+        world.add(body.velocity(Vec3::X * (3.0 - 6.0 * k as f32), Vec3::new(0.0, 5.0, -8.0)));
+    }
+    world.join(Joint::new(0, Vec3::X * 0.45, 1, Vec3::X * -0.45).colliding());
+    let energy = |world: &World| world.bodies.iter().map(Body::kinetic_energy).sum::<f64>();
+    let before = energy(&world);
+    let mut simulation = Simulation::with(world, SolverConfig::default(), reference()).expect("a simulation");
+    for _ in 0..120 {
+        simulation.step(DT).expect("a step");
+        assert!(energy(&simulation.world) < 1.01 * before, "{} J from {before}", energy(&simulation.world));
+    }
 }

@@ -10,6 +10,7 @@ mod laws;
 
 mod breaking;
 mod closed_forms;
+mod cones;
 mod conform;
 mod course;
 mod damping;
@@ -36,6 +37,7 @@ mod saved_problem;
 mod solver;
 mod spin;
 mod spring_dampers;
+mod surfaces;
 mod teleports;
 mod waits;
 
@@ -43,6 +45,7 @@ fn main() -> std::process::ExitCode {
     common::harness::run([
         breaking::tests(),
         closed_forms::tests(),
+        cones::tests(),
         conform::tests(),
         course::tests(),
         damping::tests(),
@@ -69,6 +72,7 @@ fn main() -> std::process::ExitCode {
         solver::tests(),
         spin::tests(),
         spring_dampers::tests(),
+        surfaces::tests(),
         teleports::tests(),
         waits::tests(),
     ])

@@ -259,6 +259,32 @@ fn boxes_ride_on_a_conveyor_at_its_speed_and_as_many_leave_as_come() {
     }
 }
 
+/// Every body goes round the square: its angle about the middle grows, and it stays between the walls.
+#[test]
+fn all_bodies_ride_round_on_belts_and_none_leaves() {
+    for speed in [1.0, 2.0] {
+        let mut turned = vec![0.0; 24];
+        let mut before: Option<Vec<Vec3>> = None;
+        let steps = (1800.0 / speed) as u32;
+        flow("belts", &[&format!("speed={speed}")], steps, |step, simulation, _| {
+            let places: Vec<Vec3> = simulation.world.dynamic().map(|b| b.position).collect();
+            for (i, at) in places.iter().enumerate() {
+                let out = at.x.abs().max(at.z.abs());
+                let name = &simulation.world.bodies[i + 2].name;
+                assert!((2.5..3.5).contains(&out) && (at.y - 0.2).abs() < 0.2, "step {step}: {name} {i} at {at}");
+                if let Some(before) = &before {
+                    turned[i] += before[i].cross(*at).y.atan2(before[i].dot(*at));
+                }
+            }
+            before = Some(places);
+        });
+        // A round of 24 m takes 24 s at 1 m/s.
+        let least = turned.iter().map(|angle| -angle).fold(f32::INFINITY, f32::min);
+        println!("the slowest turned by {least} rad at {speed} m/s");
+        assert!(least > 0.8 * std::f32::consts::TAU, "{turned:?}");
+    }
+}
+
 #[test]
 fn every_ball_that_passes_a_turnstile_turns_its_cross_by_a_quarter_and_all_pass() {
     for every in [40, 45, 60, 65, 120] {

@@ -449,16 +449,28 @@ fn materials_of_shapes_and_their_rules_are_keys() {
         let text = format!(r#"{{"version": 1, "bodies": [{{"name": "b", "shapes": [{shape}]{body}}}]}}"#);
         SceneFile::parse(&text).and_then(|file| file.into_scene("a"))
     };
-    let body = r#", "friction": 0.2, "friction_rule": "geometric_mean", "restitution_rule": "average""#;
-    let scene = read(body, r#", "material": {"friction": 0.1, "friction_rule": "minimum"}"#).expect("a scene");
+    let body = r#", "friction": 0.2, "friction_rule": "geometric_mean", "restitution_rule": "average",
+        "rolling_friction": 0.01, "spinning_friction": 0.02, "surface_velocity": [1, 0, -2]"#;
+    let own = r#", "material": {"friction": 0.1, "friction_rule": "minimum", "rolling_friction": 0.03,
+        "spinning_friction": 0.04, "surface_velocity": [0, 3, 0]}"#;
+    let scene = read(body, own).expect("a scene");
     let again = SceneFile::parse(&SceneFile::of(&scene).expect("a file").to_text()).expect("its text");
-    let own = Material { friction: 0.1, friction_rule: Some(CombineRule::Minimum), ..Material::default() };
+    let own = Material {
+        friction: 0.1,
+        friction_rule: Some(CombineRule::Minimum),
+        rolling_friction: 0.03,
+        spinning_friction: 0.04,
+        surface_velocity: Vec3::Y * 3.0,
+        ..Material::default()
+    };
     for world in [scene.world, again.into_scene("a").expect("a scene").world] {
         let body = &world.bodies[0];
         assert_eq!(body.colliders[0].material, Some(own));
         let rules = [body.material.friction_rule, body.material.restitution_rule];
         assert_eq!(rules, [Some(CombineRule::GeometricMean), Some(CombineRule::Average)]);
-        assert_eq!(body.material.friction, 0.2);
+        let Material { friction, rolling_friction, spinning_friction, surface_velocity, .. } = body.material;
+        assert_eq!([friction, rolling_friction, spinning_friction], [0.2, 0.01, 0.02]);
+        assert_eq!(surface_velocity, Vec3::new(1.0, 0.0, -2.0));
     }
     assert_eq!(read("", "").expect("a scene").world.bodies[0].colliders[0].material, None);
     let line = |body: &str, shape: &str| read(body, shape).map(|_| ()).expect_err("a refusal").to_string();
@@ -466,6 +478,8 @@ fn materials_of_shapes_and_their_rules_are_keys() {
     assert_eq!(bounce, "body 0 \"b\": shapes[0]: restitution = 2: must be 0 to 1");
     let huge = line("", r#", "material": {"friction": 1e300}"#);
     assert!(huge.starts_with("body 0 \"b\": shapes[0]: material: friction = 1e300"), "{huge}");
+    let rolls = line(r#", "rolling_friction": -1"#, "");
+    assert_eq!(rolls, "body 0 \"b\": rolling_friction = -1 m: must be 0 or more");
     let rule = line(r#", "friction_rule": "mean""#, "");
     assert!(rule.starts_with("body 0 \"b\": friction_rule: "), "{rule}");
 }
@@ -485,8 +499,8 @@ fn the_schema_describes_every_key() {
     let body = &schema["$defs"]["BodyFile"];
     assert_eq!(
         keys(body),
-        "additional_mass angular_damping angular_velocity can_sleep density force friction friction_rule gravity_scale groups kind leaves linear_damping linear_velocity locked_rotations mass \
-         mass_properties name position restitution restitution_rule rotation shapes swept torque"
+        "additional_mass angular_damping angular_velocity can_sleep density force friction friction_rule gravity_scale groups kind leaves linear_damping linear_velocity locked_rotations locked_translations mass \
+         mass_properties max_angular_speed max_linear_speed name position restitution restitution_rule rolling_friction rotation shapes spinning_friction surface_velocity swept torque"
     );
     assert_eq!(keys(&schema["$defs"]["SpawnerFile"]), "body count every first");
     assert_eq!(keys(&schema["$defs"]["LeavesFile"]), "after below");

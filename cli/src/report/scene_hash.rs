@@ -54,11 +54,18 @@ pub fn content_hash(scene: &Scene) -> String {
     }
     for b in &scene.world.bodies {
         let pose = (b.kind, b.position, b.rotation, b.linear_velocity, b.angular_velocity);
-        let Material { friction, restitution, friction_rule, restitution_rule } = b.material;
+        let Material { friction, restitution, friction_rule, restitution_rule, .. } = b.material;
         let material = format!("Material {{ friction: {friction:?}, restitution: {restitution:?} }}");
         let _ = write!(sink, "{pose:?} {:?} {:?} {material}", b.force, b.mass);
         if (friction_rule, restitution_rule) != (None, None) {
             let _ = write!(sink, "rules {friction_rule:?} {restitution_rule:?}");
+        }
+        let Material { rolling_friction, spinning_friction, surface_velocity, .. } = b.material;
+        if (rolling_friction, spinning_friction) != (0.0, 0.0) {
+            let _ = write!(sink, "rolling {rolling_friction:?} {spinning_friction:?}");
+        }
+        if surface_velocity != drystone::glam::Vec3::ZERO {
+            let _ = write!(sink, "surface {surface_velocity:?}");
         }
         // Most scenes have neither torque nor a gravity scale, and keep the hashes that reports contain.
         if (b.torque, b.gravity_scale) != (drystone::glam::Vec3::ZERO, 1.0) {
@@ -69,6 +76,12 @@ pub fn content_hash(scene: &Scene) -> String {
         }
         if b.locked_rotations != [false; 3] {
             let _ = write!(sink, "locked {:?}", b.locked_rotations);
+        }
+        if b.locked_translations != [false; 3] {
+            let _ = write!(sink, "held {:?}", b.locked_translations);
+        }
+        if (b.max_linear_speed, b.max_angular_speed) != (f32::INFINITY, f32::INFINITY) {
+            let _ = write!(sink, "speeds {:?} {:?}", b.max_linear_speed, b.max_angular_speed);
         }
         if !b.can_sleep {
             let _ = write!(sink, "awake");
@@ -99,7 +112,7 @@ mod tests {
     fn the_hash_sees_what_a_step_sees() {
         let scene = Scene::find("drop", &[]).unwrap();
         assert_eq!(content_hash(&scene), content_hash(&Scene::find("drop", &[]).unwrap()));
-        let changes: [fn(&mut Scene); 14] = [
+        let changes: [fn(&mut Scene); 20] = [
             |s| s.dt *= 0.5,
             |s| s.world.bodies[3].position.x += 1e-6,
             |s| s.world.bodies[3].force.y = 1e-3,
@@ -107,10 +120,16 @@ mod tests {
             |s| s.world.bodies[3].gravity_scale = 0.5,
             |s| s.world.bodies[3].angular_damping = 0.5,
             |s| s.world.bodies[3].locked_rotations[1] = true,
+            |s| s.world.bodies[3].locked_translations[1] = true,
+            |s| s.world.bodies[3].max_linear_speed = 9.0,
+            |s| s.world.bodies[3].max_angular_speed = 9.0,
             |s| s.world.bodies[3].can_sleep = false,
             |s| s.world.own_gravity = vec![Some(drystone::glam::Vec3::X)],
             |s| s.world.bodies[3].material.friction = 0.51,
             |s| s.world.bodies[3].material.friction_rule = Some(drystone::CombineRule::Average),
+            |s| s.world.bodies[3].material.rolling_friction = 1e-3,
+            |s| s.world.bodies[3].material.spinning_friction = 1e-3,
+            |s| s.world.bodies[3].material.surface_velocity.z = 1e-3,
             |s| s.world.bodies[3].colliders[0].material = Some(Material::default()),
             |s| s.world.bodies[3].colliders[0].shape = drystone::Shape::ball(0.25),
             |s| s.world.beside(&drystone::World::new()),

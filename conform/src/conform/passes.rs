@@ -12,7 +12,7 @@ use drystone::stages::plan::{Kernel, Pass};
 pub fn every_rules() -> Vec<Rules> {
     let mut all = Vec::new();
     for friction in [FrictionRule::None, FrictionRule::Slip, FrictionRule::Box, FrictionRule::Disc] {
-        for bits in 0..512 {
+        for bits in 0..1024 {
             let has = |bit: u32| bits >> bit & 1 == 1;
             let rules = Rules {
                 biased: has(0),
@@ -29,17 +29,24 @@ pub fn every_rules() -> Vec<Rules> {
                 from_start: has(7),
                 isotropic: has(8),
                 bounces: has(4),
+                rolls: has(9),
                 axes: false,
             };
             // Velocities since the start of the step are combined with every sum of velocities without the rules below.
             let plain = rules.accumulated && !(rules.friction_first || rules.round || rules.measured || rules.driven);
             // Equal moments of inertia are combined with every impulse without the rules above. Without friction,
-            // `friction_first` makes no difference. Belts drive only points. Belts and repeated passes are not combined
-            // with all other rules again.
+            // `friction_first` makes no difference. Belts and repeated passes are not combined with all other rules
+            // again.
             let drivable = matches!(friction, FrictionRule::Box | FrictionRule::Disc)
                 && rules.accumulated
-                && !(rules.patch || rules.round || rules.measured);
+                && !(rules.round || rules.measured);
+            // Patches that resist rolling are combined with every rule of friction, and with belts.
+            let rollable = friction != FrictionRule::None
+                && rules.patch
+                && rules.accumulated
+                && !(rules.friction_first || rules.round || rules.measured);
             if (friction != FrictionRule::None || !rules.friction_first)
+                && (rollable || !rules.rolls)
                 && (drivable || !rules.driven)
                 && (plain || !rules.from_start)
                 && (plain && !rules.from_start || !rules.isotropic)

@@ -322,9 +322,10 @@ fn damping_row(body: u32) -> DampingRow {
 }
 
 fn point_row(random: &mut Random, patches: bool) -> PointRow {
-    // A slip direction for a point without patches, else a distance from the center of the patch.
+    // A slip direction for a point without patches, else a distance from the center of the patch, or the levers of a
+    // patch that resists rolling.
     let (sin, cos) = random.within(0.0, std::f32::consts::TAU).sin_cos();
-    let [slip_1, slip_2] = if patches { [sin.abs(), 0.0] } else { [sin, cos] };
+    let [slip_1, slip_2] = if patches { [sin.abs(), cos.abs()] } else { [sin, cos] };
     PointRow {
         r_a: random.vector(1.0).to_array(),
         separation: random.within(-0.3, 0.3),

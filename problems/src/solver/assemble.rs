@@ -117,6 +117,7 @@ fn point(operator: &Operator, index: usize, hand: f64) -> Point<f64> {
 fn mass(operator: &Operator, body: usize) -> Mass<f64> {
     let DMat3 { x_axis: x, y_axis: y, z_axis: z } = operator.inverse_inertia(body);
     Mass {
+        locks: 0.0,
         inv_inertia: Sym3 { x: wide(x), yz: vec3(y.y, y.z, z.z) },
         inv_mass: 1.0 / operator.problem().bodies[body].mass,
         acceleration: Vec3::default(),

@@ -9,7 +9,8 @@ use crate::scene::Scene;
 use crate::spawner::{Leaves, Spawner};
 use drystone::stages::math::rotation::about;
 use drystone::stages::random::SplitMix64;
-use drystone::{Body, Groups, Joint, Result, Shape, World};
+use drystone::world::Collider;
+use drystone::{Body, CombineRule, Groups, Joint, Material, Result, Shape, World};
 
 /// Radius of the rollers of the conveyor (m), and the distance between neighbors.
 const ROLLER: f32 = 0.15;
@@ -41,6 +42,46 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
     scene.leaving.push((first, below(-1.0)));
     scene.spawners.push(Spawner { leaves: below(-1.0), first: every, ..Spawner::new(parcel, every) });
     Ok(scene)
+}
+
+/// Four belts around a square, each of which ends at the side of the next. `n` boxes and balls
+/// ride round on them at `speed` (m/s), between two smooth walls. Every third is a ball that resists rolling.
+pub(super) fn belts(n: usize, speed: f32) -> Scene {
+    const BELTS: f32 = 3.0;
+    const HALF_WIDTH: f32 = 0.5;
+    let mut world = World::new();
+    let (mut belts, mut walls) = (Body::fixed().named("belts"), Body::fixed().named("walls"));
+    let slippery = Material { friction: 0.0, friction_rule: Some(CombineRule::Minimum), ..Material::default() };
+    for k in 0..4 {
+        let side = about(Vec3::Y, -FRAC_PI_2 * k as f32);
+        let piece = |half: Vec3, at: Vec3, material: Material| Collider {
+            position: side * at,
+            rotation: side,
+            material: Some(material),
+            ..Collider::new(Shape::cuboid(half.x, half.y, half.z))
+        };
+        let runs = Material { surface_velocity: side * Vec3::X * speed, ..Material::default() };
+        let [outer, inner] = [BELTS + HALF_WIDTH, BELTS - HALF_WIDTH];
+        belts = belts.collider(piece(Vec3::new(BELTS, 0.1, HALF_WIDTH), Vec3::new(-HALF_WIDTH, -0.1, -BELTS), runs));
+        for (half_length, z) in [(outer + 0.1, -outer - 0.05), (inner, -inner + 0.05)] {
+            walls = walls.collider(piece(Vec3::new(half_length, 0.3, 0.05), Vec3::new(0.0, 0.2, z), slippery));
+        }
+    }
+    world.add(belts);
+    world.add(walls);
+    for i in 0..n {
+        let (lap, along) = (4 * i / n, 4.0 * i as f32 / n as f32);
+        let side = about(Vec3::Y, -FRAC_PI_2 * lap as f32);
+        let place = side * Vec3::new(2.0 * BELTS * (along - lap as f32) - BELTS, 0.2, -BELTS);
+        let rolls = Material { rolling_friction: 0.02, ..Material::default() };
+        let body = if i % 3 == 2 {
+            Body::dynamic().named("ball").shape(Shape::ball(0.2)).material(rolls)
+        } else {
+            Body::dynamic().named("box").shape(Shape::cuboid(0.2, 0.2, 0.15)).rotation(side)
+        };
+        world.add(body.position(place.x, place.y, place.z));
+    }
+    Scene::new("belts", world, 900)
 }
 
 /// A channel that slopes by 8 degrees. A cross of four arms turns freely about an upright axis in it: a hinge of two

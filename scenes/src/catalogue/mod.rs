@@ -404,6 +404,16 @@ pub static CATALOGUE: &[Entry] = &[
         build: |v| flow::conveyor(v[0] as f32, v[1] as f32, v[2] as u32),
     },
     Entry {
+        name: "belts",
+        summary: "boxes and balls ride round on four belts: all come round, none leaves",
+        parameters: &[
+            Parameter::whole("n", 24, (1.0, 40.0), "number of boxes and balls"),
+            Parameter::real("speed", 1.0, (0.1, 3.0), "speed of the belts [m/s]"),
+        ],
+        bodies: |v| v[0],
+        build: |v| Ok(flow::belts(v[0] as usize, v[1] as f32)),
+    },
+    Entry {
         name: "turnstile",
         summary: "balls roll down a channel and push a cross of four arms: one passes in a quarter turn, all in the end",
         parameters: &[

@@ -81,10 +81,23 @@ fn body(file: &BodyFile) -> Result<Body> {
     [body.linear_damping] = finite("linear_damping", [file.linear_damping])?;
     [body.angular_damping] = finite("angular_damping", [file.angular_damping])?;
     (body.locked_rotations, body.can_sleep) = (file.locked_rotations, file.can_sleep);
+    body.locked_translations = file.locked_translations;
+    let speed = |name, speed: Option<f64>| -> Result<f32> {
+        speed.map_or(Ok(f32::INFINITY), |speed| finite(name, [speed]).map(|[speed]| speed))
+    };
+    body.max_linear_speed = speed("max_linear_speed", file.max_linear_speed)?;
+    body.max_angular_speed = speed("max_angular_speed", file.max_angular_speed)?;
     body.groups = file.groups;
     body.swept = file.swept;
-    let BodyFile { friction, restitution, friction_rule, restitution_rule, .. } = *file;
-    let own = material(&MaterialFile { friction, restitution, friction_rule, restitution_rule })?;
+    let own = material(&MaterialFile {
+        friction: file.friction,
+        restitution: file.restitution,
+        friction_rule: file.friction_rule,
+        restitution_rule: file.restitution_rule,
+        rolling_friction: file.rolling_friction,
+        spinning_friction: file.spinning_friction,
+        surface_velocity: file.surface_velocity,
+    })?;
     let mut body = body
         .position(x, y, z)
         .rotation(rotation("rotation", file.rotation)?)
@@ -167,9 +180,16 @@ fn additional_mass(file: &AdditionalMassFile) -> Result<MassProperties> {
 }
 
 fn material(file: &MaterialFile) -> Result<Material> {
-    let MaterialFile { friction, restitution, friction_rule, restitution_rule } = *file;
-    let ([friction], [restitution]) = (finite("friction", [friction])?, finite("restitution", [restitution])?);
-    Ok(Material { friction, restitution, friction_rule, restitution_rule })
+    let number = |name, x: f64| finite(name, [x]).map(|[x]| x);
+    Ok(Material {
+        friction: number("friction", file.friction)?,
+        restitution: number("restitution", file.restitution)?,
+        friction_rule: file.friction_rule,
+        restitution_rule: file.restitution_rule,
+        rolling_friction: number("rolling_friction", file.rolling_friction)?,
+        spinning_friction: number("spinning_friction", file.spinning_friction)?,
+        surface_velocity: finite("surface_velocity", file.surface_velocity)?.into(),
+    })
 }
 
 /// A shape on a body. It is checked before the body computes a mass from it.

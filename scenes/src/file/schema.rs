@@ -142,6 +142,15 @@ pub struct BodyFile {
     pub angular_damping: f64,
     /// Whether a dynamic body does not turn about the axes x, y and z of the world.
     pub locked_rotations: [bool; 3],
+    /// World axes x, y, z along which the center of mass does not move. Only for dynamic bodies.
+    #[serde(skip_serializing_if = "are_false")]
+    pub locked_translations: [bool; 3],
+    /// Largest speed of the center of mass (m/s), 0 or more; unlimited by default. Only for dynamic bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_linear_speed: Option<f64>,
+    /// Largest angular speed (rad/s), likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_angular_speed: Option<f64>,
     /// Whether a dynamic body may fall asleep.
     pub can_sleep: bool,
     /// Density of all shapes (kg/m³), more than 0. The default is 1000 for a dynamic body without a mass.
@@ -167,6 +176,16 @@ pub struct BodyFile {
     /// How contacts combine restitution, likewise; by default it is the larger value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution_rule: Option<CombineRule>,
+    /// Lever of rolling friction (m), 0 or more: the torque against rolling over the normal force of the contact. The
+    /// larger value of two bodies counts.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub rolling_friction: f64,
+    /// Lever of spinning friction (m), 0 or more: the torque against spin about the normal, likewise.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub spinning_friction: f64,
+    /// Velocity of the surface relative to the body, as of a belt, in the axes of the body (m/s).
+    #[serde(skip_serializing_if = "are_zero")]
+    pub surface_velocity: [f64; 3],
     /// Collision groups: which bodies it collides with. 32 groups, one bit each.
     pub groups: Groups,
     /// Whether the body is a bullet, which does not pass through moving bodies.
@@ -193,6 +212,9 @@ impl Default for BodyFile {
             linear_damping: 0.0,
             angular_damping: 0.0,
             locked_rotations: [false; 3],
+            locked_translations: [false; 3],
+            max_linear_speed: None,
+            max_angular_speed: None,
             can_sleep: true,
             density: None,
             mass: None,
@@ -202,6 +224,9 @@ impl Default for BodyFile {
             restitution: 0.0,
             friction_rule: None,
             restitution_rule: None,
+            rolling_friction: 0.0,
+            spinning_friction: 0.0,
+            surface_velocity: [0.0; 3],
             groups: Groups::ALL,
             swept: false,
             leaves: None,
@@ -281,11 +306,41 @@ pub struct MaterialFile {
     /// How contacts combine restitution: see the key of a body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restitution_rule: Option<CombineRule>,
+    /// Lever of rolling friction (m), 0 or more: see the key of a body.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub rolling_friction: f64,
+    /// Lever of spinning friction (m), 0 or more: see the key of a body.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub spinning_friction: f64,
+    /// Velocity of the surface relative to the body, in the axes of the body (m/s).
+    #[serde(skip_serializing_if = "are_zero")]
+    pub surface_velocity: [f64; 3],
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+fn are_false(all: &[bool; 3]) -> bool {
+    *all == [false; 3]
+}
+
+fn are_zero(x: &[f64; 3]) -> bool {
+    *x == [0.0; 3]
 }
 
 impl Default for MaterialFile {
     fn default() -> Self {
-        Self { friction: 0.5, restitution: 0.0, friction_rule: None, restitution_rule: None }
+        Self {
+            friction: 0.5,
+            restitution: 0.0,
+            friction_rule: None,
+            restitution_rule: None,
+            rolling_friction: 0.0,
+            spinning_friction: 0.0,
+            surface_velocity: [0.0; 3],
+        }
     }
 }
 

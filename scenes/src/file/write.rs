@@ -72,6 +72,7 @@ fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
         principal_frame: numbers(b.mass.principal_frame.to_array()),
     };
     let leaves = leaves.filter(|leaves| *leaves != Leaves::default());
+    let own = material(&b.material);
     Ok(BodyFile {
         name: Some(b.name.clone()),
         kind: b.kind,
@@ -85,15 +86,21 @@ fn body(b: &Body, leaves: Option<Leaves>) -> Result<BodyFile> {
         linear_damping: number(b.linear_damping),
         angular_damping: number(b.angular_damping),
         locked_rotations: b.locked_rotations,
+        locked_translations: b.locked_translations,
+        max_linear_speed: Some(b.max_linear_speed).filter(|speed| speed.is_finite()).map(number),
+        max_angular_speed: Some(b.max_angular_speed).filter(|speed| speed.is_finite()).map(number),
         can_sleep: b.can_sleep,
         density: None,
         mass: None,
         mass_properties: (b.kind == BodyKind::Dynamic).then(|| mass(b)),
         additional_mass: None,
-        friction: number(b.material.friction),
-        restitution: number(b.material.restitution),
-        friction_rule: b.material.friction_rule,
-        restitution_rule: b.material.restitution_rule,
+        friction: own.friction,
+        restitution: own.restitution,
+        friction_rule: own.friction_rule,
+        restitution_rule: own.restitution_rule,
+        rolling_friction: own.rolling_friction,
+        spinning_friction: own.spinning_friction,
+        surface_velocity: own.surface_velocity,
         groups: b.groups,
         swept: b.swept,
         leaves: leaves.map(|Leaves { below, after }| LeavesFile { below: below.map(number), after: after.map(number) }),
@@ -125,13 +132,19 @@ fn shape(c: &Collider) -> Result<ShapeFile> {
         _ => return Err(input!("a shape of type {:?}: a scene file cannot represent it", c.shape)),
     };
     let (position, rotation) = (numbers(c.position.to_array()), numbers(c.rotation.to_array()));
-    let material = c.material.map(|Material { friction, restitution, friction_rule, restitution_rule }| MaterialFile {
-        friction: number(friction),
-        restitution: number(restitution),
-        friction_rule,
-        restitution_rule,
-    });
-    Ok(ShapeFile { position, rotation, sensor: c.sensor, material, geometry })
+    Ok(ShapeFile { position, rotation, sensor: c.sensor, material: c.material.as_ref().map(material), geometry })
+}
+
+fn material(of: &Material) -> MaterialFile {
+    MaterialFile {
+        friction: number(of.friction),
+        restitution: number(of.restitution),
+        friction_rule: of.friction_rule,
+        restitution_rule: of.restitution_rule,
+        rolling_friction: number(of.rolling_friction),
+        spinning_friction: number(of.spinning_friction),
+        surface_velocity: numbers(of.surface_velocity.to_array()),
+    }
 }
 
 fn joint(joint: &Joint, index_of: &[usize]) -> Result<JointFile> {

@@ -276,8 +276,9 @@ pub(super) unsafe fn wide_body<L: Lanes>(states: *const State, places: &[u32; WI
 #[inline(always)]
 pub(super) unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WIDTH]) -> Mass<L> {
     // SAFETY: the caller's promise.
-    let [xx, xy, xz, inv_mass, yy, yz, zz, _] = unsafe { L::gathered(&raw const (*states).mass, places) };
-    Mass { inv_inertia: Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, inv_mass, acceleration: Vec3::default() }
+    let [xx, xy, xz, inv_mass, yy, yz, zz, locks] = unsafe { L::gathered(&raw const (*states).mass, places) };
+    let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
+    Mass { inv_inertia, inv_mass, locks, acceleration: Vec3::default() }
 }
 
 /// The velocities of sixteen bodies at the start of the step, in rows at the places of their states.

@@ -305,9 +305,9 @@ impl SystemRows<f32> for Alone<'_, '_> {
             let slot = self.work.slots[body as usize] as usize;
             // SAFETY: a system that is being set up writes no body, and no other pass runs at the same time.
             let state = unsafe { &*self.work.bodies.slice(slot..slot + 1).as_ptr() };
-            let [xx, xy, xz, inv_mass, yy, yz, zz, _] = state.mass.0;
+            let [xx, xy, xz, inv_mass, yy, yz, zz, locks] = state.mass.0;
             let inv_inertia = Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) };
-            (state.load(), Mass { inv_inertia, inv_mass, acceleration: Vec3::default() })
+            (state.load(), Mass { inv_inertia, inv_mass, locks, acceleration: Vec3::default() })
         });
         // No velocity is read.
         (Joint::load(row), Pair { a, b, mass_a, mass_b, ..Pair::default() })

@@ -35,7 +35,7 @@ use crate::kernels::momentum::{StepLength, chunked_sum};
 use crate::kernels::{Inertia, Momentum};
 use crate::lanes::{InstructionSet, Row8, Shared, WIDTH};
 use crate::plan::{Kernel, Pass};
-use crate::problem::{ContactRow, ConvergenceRow, JointRow, StepProblem};
+use crate::problem::{ContactRow, ConvergenceRow, JointRow, MassRow, StepProblem};
 use bodies::{State, extrapolate_velocities, load_bodies, place, store_bodies};
 use joint_systems::{SharedFactors, SystemLayout, SystemsFactors};
 use lane_layout::{LaneLayout, Uses};
@@ -127,8 +127,9 @@ impl Cpu {
         self.inertias.sort_unstable_by_key(|inertia| inertia.0);
         self.places.clear();
         self.places.extend(slots.iter().enumerate().map(|(body, &slot)| {
-            let is_movable = problem.masses.get(body).is_some_and(|mass| mass.inv_mass > 0.0);
-            BodyPlace { place: place(slot as usize), is_movable }
+            let MassRow { inv_mass, locks, .. } = problem.masses.get(body).copied().unwrap_or_default();
+            let locked = [1, 2, 4].map(|axis| locks as u32 & axis != 0);
+            BodyPlace { place: place(slot as usize), is_movable: inv_mass > 0.0, locked }
         }));
         let on = (self.instructions, threads);
         let is_any = |uses: fn(Kernel) -> bool| passes.iter().any(|pass| uses(pass.kernel));

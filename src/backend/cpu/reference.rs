@@ -251,15 +251,15 @@ impl<S: Scalar> Reference<S> {
         Pair { a: self.rows.bodies[a], b: self.rows.bodies[b], mass_a, mass_b, start_a, start_b, moving }
     }
 
-    /// A body that cannot move is never written.
+    /// A body that cannot move is never written, and one with locked axes does not move along them.
     fn store_pair(&mut self, bodies: [u32; 2], pair: &Pair<S>) {
         let [a, b] = bodies.map(|body| body as usize);
         let zero = S::constant(0.0);
         if pair.mass_a.inv_mass > zero {
-            (self.rows.bodies[a].v, self.rows.bodies[a].w) = (pair.a.v, pair.a.w);
+            (self.rows.bodies[a].v, self.rows.bodies[a].w) = (pair.mass_a.unlocked(pair.a.v), pair.a.w);
         }
         if pair.mass_b.inv_mass > zero {
-            (self.rows.bodies[b].v, self.rows.bodies[b].w) = (pair.b.v, pair.b.w);
+            (self.rows.bodies[b].v, self.rows.bodies[b].w) = (pair.mass_b.unlocked(pair.b.v), pair.b.w);
         }
         if pair.moving > zero {
             self.convergence.moving = 1;

@@ -163,11 +163,15 @@ unsafe fn wide_pair<L: Lanes>(states: *const State, a: &BodyLanes, b: &BodyLanes
 /// The places are those of states, and no other thread uses those that can move meanwhile.
 #[inline(always)]
 unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &BodyLanes, body: &Body<L>) {
-    let BodyLanes { places, movable } = *bodies;
+    let BodyLanes { places, movable, locked } = *bodies;
     if movable == 0 {
         return;
     }
-    let rows = velocity_rows(body.v, body.w);
+    let mut rows = velocity_rows(body.v, body.w);
+    for (axis, lanes) in locked.into_iter().enumerate().filter(|(_, lanes)| *lanes != 0) {
+        let own = rows.iter_mut().enumerate().filter(|(lane, _)| lanes & (1 << lane) != 0);
+        own.for_each(|(_, row)| row.0[axis] = 0.0);
+    }
     for lane in 0..WIDTH {
         // Almost always all are movable.
         if movable == u16::MAX || movable & (1 << lane) != 0 {

@@ -253,6 +253,7 @@ fn rules_text(rules: Rules) -> String {
     let Rules {
         biased,
         patch,
+        rolls,
         friction_first,
         accumulated,
         round,
@@ -273,7 +274,7 @@ fn rules_text(rules: Rules) -> String {
         FrictionRule::Disc => "DISC",
     };
     format!(
-        "Rules({biased}, FRICTION_{friction}, {patch}, {friction_first}, {accumulated}, {round}, {as_one}, {passes}u, {driven}, {measured}, {from_start}, {isotropic}, {bounces})"
+        "Rules({biased}, FRICTION_{friction}, {patch}, {rolls}, {friction_first}, {accumulated}, {round}, {as_one}, {passes}u, {driven}, {measured}, {from_start}, {isotropic}, {bounces})"
     )
 }
 

@@ -72,7 +72,7 @@ impl ContactRows {
             slots,
             graph: _,
             coloring,
-            patches,
+            layout,
             computed,
             poses: _,
             jams,
@@ -86,7 +86,7 @@ impl ContactRows {
             sums: _,
             carry: _,
         } = self;
-        patches.walk(archive)?;
+        layout.walk(archive)?;
         materials.walk(archive)?;
         let is_taken = walk_slots(slots, detector, archive)?;
         hooked.walk(archive)?;
@@ -95,7 +95,7 @@ impl ContactRows {
         })?;
         walk_same(coloring, || lay_out(&slots.edges, &slots.taking_part().collect::<Vec<_>>()), archive)?;
         walk_same(classes, || effort.classes().to_vec(), archive)?;
-        let (count, stride) = (slots.all.len(), points_a_slot(*patches));
+        let (count, stride) = (slots.all.len(), points_a_slot(layout.patches));
         let offsets = coloring.offsets.is_sorted()
             && coloring.offsets.last().is_none_or(|&end| end as usize <= coloring.order.len());
         let fits = offsets && coloring.order.iter().all(|&row| (row as usize) < count);
@@ -142,11 +142,12 @@ impl ContactRows {
             poses: &poses,
             carry: &carry,
             brings_impulses: false,
-            patches: *patches,
+            layout: *layout,
             hooked,
             may_jam: materials.unwrap_or_else(|| Materials::of(world)).and(hooked).may_jam,
+            locked: world.bodies.iter().any(Body::has_locked_translation),
         };
-        let slips = rule == FrictionRule::Slip && !*patches;
+        let slips = rule == FrictionRule::Slip && !layout.patches;
         let task = |first: usize| {
             let own = first..(first + SLOTS_A_TASK).min(count);
             let mut buffers = Buffers::new(own.len(), stride);
@@ -172,6 +173,8 @@ impl ContactRows {
                 };
                 let turns = |&body: &usize| masses[body].inv_mass > 0.0 && !has_equal_moments(&world.bodies[body]);
                 match all_there && bodies.iter().any(turns) {
+                    // Slips have the rotations that bodies had when they were written.
+                    _ if layout.driven => Rows::All,
                     // Rows of contacts at rest are written again before they are swept.
                     _ if !slot.takes_part && all_there => Rows::Remade,
                     _ if slot.write != Write::Separations || !all_there || !bodies.iter().all(is_same) => Rows::All,
@@ -211,7 +214,7 @@ impl ContactRows {
             let fits =
                 of_bodies && contact.point_count as usize <= MAX_POINTS && contact.first_point as usize == i * stride;
             ensure(fits, || format!("row {i} has other bodies or points"))?;
-            let own = contact.point_count as usize + usize::from(*patches);
+            let own = contact.point_count as usize + usize::from(layout.patches);
             points[i * stride..][..own].iter_mut().try_for_each(|point| point.walk(archive))?;
             computed[i].walk(archive)?;
             jams[i].walk(archive)?;
@@ -222,7 +225,7 @@ impl ContactRows {
             for i in range.filter(|&i| is_taken[i]) {
                 let (slot, contact) = (&slots.all[i], &contacts[i]);
                 let mut own = SlotLoads { rows: kinds[i], ..SlotLoads::default() };
-                let count = contact.point_count as usize + usize::from(*patches);
+                let count = contact.point_count as usize + usize::from(layout.patches);
                 if !columns.reads() {
                     let rows = i * stride..i * stride + count;
                     own = SlotLoads {
@@ -246,7 +249,7 @@ impl ContactRows {
         })?;
         for (i, own) in loads.into_iter().flatten() {
             let contact = &mut contacts[i];
-            let count = contact.point_count as usize + usize::from(*patches);
+            let count = contact.point_count as usize + usize::from(layout.patches);
             (sags[i], slots.all[i].need, contact.preload, contact.substep_share) =
                 (own.sag, own.need, own.preload, own.share);
             impulses[i * stride..][..count].copy_from_slice(&own.impulses[..count]);

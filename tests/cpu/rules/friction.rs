@@ -69,6 +69,7 @@ fn surfaces_combine_by_the_later_of_their_rules() {
         restitution: number,
         friction_rule: rule,
         restitution_rule: rule,
+        ..Material::default()
     };
     let rules = [Average, GeometricMean, Minimum, Multiply, Maximum];
     let (a, b) = (0.9, 0.4);

@@ -67,7 +67,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
     layouts! {
         Body = BodyRow { v w dp dq }
         Free = FreeRow { v w }
-        Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz pad_inertia acceleration }
+        Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz locks acceleration }
         Torque = TorqueRow { angular_acceleration }
         Damping = DampingRow { linear_gain linear_loss angular_gain angular_loss }
         Inertia = InertiaRow { principal body inv_principal frame }
