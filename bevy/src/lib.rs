@@ -34,7 +34,12 @@
 //! | find bodies by rays and shapes | [`SpatialQuery`] |
 //! | go back in time | [`Physics::snapshot`], [`Physics::restore`] |
 //! | show smooth motion at any frame rate | [`TransformInterpolation`] |
-//! | draw shapes, contacts and joints | [`debug_lines`] |
+//! | draw shapes, contacts and joints | [`debug_lines`], or the feature `gizmos` |
+//!
+//! # Features
+//!
+//! - `gpu`: the backend of drystone on compute shaders.
+//! - `gizmos`: `PhysicsGizmosPlugin` draws with Bevy's gizmos.
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
@@ -43,6 +48,8 @@ mod components;
 mod debug;
 mod ease;
 mod events;
+#[cfg(feature = "gizmos")]
+mod gizmos;
 mod joint;
 mod physics;
 mod query;
@@ -58,6 +65,8 @@ pub use components::{
 pub use debug::{DebugLine, debug_lines};
 pub use drystone;
 pub use events::{CollisionEnd, CollisionHit, CollisionStart, JointBreak, PhysicsError, SensorEnter, SensorExit};
+#[cfg(feature = "gizmos")]
+pub use gizmos::{PhysicsGizmos, PhysicsGizmosPlugin};
 pub use joint::Joint;
 pub use physics::Physics;
 pub use query::{SpatialFilter, SpatialHit, SpatialQuery, SpatialView};

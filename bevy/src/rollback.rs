@@ -54,6 +54,7 @@ impl Physics {
     /// let before = app.world().resource::<Physics>().snapshot();
     /// step(app.world_mut());
     /// let after = app.world().resource::<Physics>().snapshot();
+    /// assert_ne!(after.hash(), before.hash());
     /// Physics::restore(app.world_mut(), &before);
     /// step(app.world_mut());
     /// assert_eq!(app.world().resource::<Physics>().snapshot().hash(), after.hash());

@@ -183,11 +183,14 @@ fn every_component_goes_in_and_out() {
 
     // Changes, and components that are taken away.
     set(&mut app, entity, |mass: &mut Mass| mass.0 = 5.0);
-    set(&mut app, entity, |kind: &mut RigidBody| *kind = RigidBody::Dynamic);
+    step(&mut app, 1);
+    let changed = app.world().resource::<Physics>().body(entity).expect("a body").clone();
+    assert_eq!((changed.mass.mass, changed.gravity_scale), (5.0, 0.5));
+    let moved = (changed.position - body.position) * 64.0;
+    assert!((moved - changed.linear_velocity).length() < 0.1, "{moved} m/s");
     app.world_mut().entity_mut(entity).remove::<(GravityScale, SweptCcd, ConstantForce)>();
     step(&mut app, 1);
-    let physics = app.world().resource::<Physics>();
-    let body = physics.body(entity).expect("a body");
+    let body = app.world().resource::<Physics>().body(entity).expect("a body");
     assert_eq!((body.mass.mass, body.gravity_scale, body.swept, body.force), (5.0, 1.0, false, Vec3::ZERO));
     assert_eq!(told(&mut app), [""; 0]);
 
@@ -196,6 +199,7 @@ fn every_component_goes_in_and_out() {
     let at = place(&app, entity);
     step(&mut app, 10);
     assert_eq!(place(&app, entity), at);
+    assert_eq!(app.world().resource::<Physics>().body(entity).expect("a body").mass.mass, 0.0);
     app.world_mut().entity_mut(entity).insert(RigidBody::Dynamic);
     step(&mut app, 10);
     assert!(place(&app, entity).y < at.y);
@@ -224,6 +228,12 @@ fn a_transform_and_a_velocity_that_a_program_sets_move_the_body() {
     step(&mut app, 1);
     assert!((get::<LinearVelocity>(&app, entity).0 - Vec3::new(64.0, 64.0, 0.0)).length() < 1e-3);
     assert!((place(&app, entity) - Vec3::new(8.0, 3.0, 0.0)).length() < 1e-3, "{}", place(&app, entity));
+    // Also beside a change of a component.
+    let lift = move |mut physics: ResMut<Physics>| physics.body_mut(entity).expect("a body").position.z = 5.0;
+    app.world_mut().run_system_once(lift).expect("it runs");
+    set(&mut app, entity, |velocity: &mut LinearVelocity| velocity.0 = Vec3::ZERO);
+    step(&mut app, 1);
+    assert!((place(&app, entity) - Vec3::new(8.0, 3.0, 5.0)).length() < 1e-3, "{}", place(&app, entity));
 }
 
 /// How often transforms changed.
@@ -280,7 +290,7 @@ fn a_body_leaves_with_its_component_and_with_its_entity() {
     let at = place(&app, b);
     step(&mut app, 5);
     assert_eq!((count(&app), place(&app, b)), (1, at));
-    app.world_mut().entity_mut(b).insert(RigidBody::Dynamic);
+    app.world_mut().entity_mut(b).insert(RigidBody::Dynamic).remove::<RigidBody>().insert(RigidBody::Dynamic);
     step(&mut app, 5);
     assert!(count(&app) == 2 && place(&app, b).y < at.y);
     let physics = app.world().resource::<Physics>();
@@ -387,7 +397,7 @@ fn a_sensor_tells_who_enters_and_leaves() {
     let gate = spawn(&mut app, gate);
     let entity = spawn(&mut app, ball(0.0, 2.0));
     // It flies through within a step.
-    let fast = (ball(0.0, 30.0), LinearVelocity(Vec3::Y * -640.0));
+    let fast = (ball(0.0, 25.0), LinearVelocity(Vec3::Y * -640.0));
     step(&mut app, 100);
     let pass =
         |name: &str, visitor| format!("Sensor{name} {{ entity: {gate:?}, sensor: {gate:?}, visitor: {visitor:?} }}");
@@ -428,6 +438,8 @@ fn queries_find_entities() {
         assert_eq!(entities(SpatialFilter { sensors: true, ..all }), [a, b, gate, layered]);
         let layers = CollisionLayers { memberships: u32::MAX, filters: 0b10 };
         assert_eq!(entities(SpatialFilter { layers, ..SpatialFilter::except(b) }), [a, layered]);
+        let layers = CollisionLayers { memberships: u32::MAX, filters: 0b01 };
+        assert_eq!(entities(SpatialFilter { layers, ..all }), [a, b]);
         let cube = Shape::cuboid(0.5, 0.5, 0.5);
         let cast = view.cast(&cube, Vec3::ZERO, Quat::IDENTITY, Vec3::X, 100.0, &all).expect("a");
         assert!(cast.entity == a && (cast.distance - 1.0).abs() < 1e-3);
@@ -483,11 +495,13 @@ fn a_restored_state_follows_entities_that_came_and_went() {
     let [a, b] = [spawn(&mut app, ball(0.0, 2.0)), spawn(&mut app, ball(3.0, 2.0))];
     let rope = |body| Joint::to_world(body, Vec3::ZERO, Vec3::Y * 4.0).with(|joint| joint.rope(5.0));
     let [rope_a, rope_b] = [spawn(&mut app, rope(a)), spawn(&mut app, rope(b))];
+    let second = spawn(&mut app, rope(a));
     step(&mut app, 5);
     let state = app.world().resource::<Physics>().snapshot();
     let at = place(&app, a);
     app.world_mut().entity_mut(b).despawn();
     app.world_mut().entity_mut(rope_b).despawn();
+    app.world_mut().entity_mut(second).despawn();
     app.world_mut().entity_mut(floor).remove::<RigidBody>();
     let c = spawn(&mut app, ball(6.0, 2.0));
     let rope_c = spawn(&mut app, rope(c));
@@ -509,8 +523,8 @@ fn a_restored_state_follows_entities_that_came_and_went() {
     // A game that spawns b again gives the state its new name.
     let body = (ball(3.0, 2.0), floor_of(&mut app));
     let again = spawn(&mut app, body.0);
-    let (rope_again, floor_again) = (spawn(&mut app, rope(again)), body.1);
-    struct Names([(Entity, Entity); 3]);
+    let (rope_again, floor_again, second_again) = (spawn(&mut app, rope(again)), body.1, spawn(&mut app, rope(a)));
+    struct Names([(Entity, Entity); 4]);
     impl bevy_ecs::entity::EntityMapper for Names {
         fn get_mapped(&mut self, source: Entity) -> Entity {
             self.0.iter().find(|(old, _)| *old == source).map_or(source, |(_, new)| *new)
@@ -518,14 +532,14 @@ fn a_restored_state_follows_entities_that_came_and_went() {
         fn set_mapped(&mut self, _: Entity, _: Entity) {}
     }
     let mut named: PhysicsSnapshot = state.clone();
-    let mut names = Names([(b, again), (rope_b, rope_again), (floor, floor_again)]);
+    let mut names = Names([(b, again), (rope_b, rope_again), (floor, floor_again), (second, second_again)]);
     bevy_ecs::entity::MapEntities::map_entities(&mut named, &mut names);
     app.world_mut().entity_mut(c).despawn();
     app.world_mut().entity_mut(rope_c).despawn();
     Physics::restore(app.world_mut(), &named);
-    assert_eq!((counts(&app), hash(&app)), ((3, 2), state.hash()));
+    assert_eq!((counts(&app), hash(&app)), ((3, 3), state.hash()));
     step(&mut app, 5);
-    assert_eq!(counts(&app), (3, 2));
+    assert_eq!(counts(&app), (3, 3));
     assert!(place(&app, again).y < at.y);
 }
 
@@ -603,6 +617,7 @@ fn a_wrong_component_is_told_once_and_spoils_nothing() {
     let lines = told(&mut app);
     assert!(lines.len() == 3 && lines[0].contains("mass = -1e0 kg"), "{lines:?}");
     assert!(lines[1].contains("axis") && lines[2].contains("itself"), "{lines:?}");
+    assert!(lines.iter().all(|line| line.contains("entity: Some")), "{lines:?}");
     set(&mut app, new, |mass: &mut Mass| mass.0 = 1.0);
     set(&mut app, joint, |joint: &mut Joint| *joint = joint.with(|joint| joint.along(Vec3::X).rope(100.0)));
     app.world_mut().entity_mut(own).despawn();
