@@ -11,6 +11,31 @@ use drystone::{Body, BodyKind, Groups, MassProperties, Shape};
 /// parent that is elsewhere. The scale does not count.
 ///
 /// The body enters the world with the next step, and leaves it at once when this component is removed.
+///
+/// ```
+/// use bevy_app::{App, FixedMain};
+/// use bevy_drystone::{Order, prelude::*};
+/// use bevy_math::Vec3;
+/// use bevy_transform::prelude::*;
+///
+/// let mut app = App::new();
+/// app.add_plugins(DrystonePlugin);
+/// // All that a body can have.
+/// let bird = app.world_mut().spawn((
+///     (RigidBody::Dynamic, Collider::from(Shape::capsule(0.1, 0.05)), Transform::from_xyz(0.0, 3.0, 0.0)),
+///     (LinearVelocity(Vec3::X * 4.0), AngularVelocity(Vec3::Y), Mass(0.3), GravityScale(0.0)),
+///     (LinearDamping(0.1), AngularDamping(2.0), LockedRotations([true, false, true]), SweptCcd),
+///     (ConstantForce(Vec3::X * 0.1), ConstantTorque(Vec3::ZERO), CollisionLayers::default()),
+///     (SleepingDisabled, TransformInterpolation, Order(7)),
+/// ));
+/// let bird = bird.id();
+/// let cloud = (RigidBody::Static, Collider::from(Shape::ball(1.0)), Sensor, ColliderDensity(1.2));
+/// let cloud = app.world_mut().spawn(cloud).id();
+/// (0..64).for_each(|_| app.world_mut().run_schedule(FixedMain));
+/// assert!(app.world().get::<Transform>(bird).expect("it is there").translation.x > 3.5);
+/// // Neither of them sleeps.
+/// assert!([bird, cloud].iter().all(|body| app.world().get::<Sleeping>(*body).is_none()));
+/// ```
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[require(Transform, LinearVelocity, AngularVelocity)]
 pub enum RigidBody {

@@ -1,7 +1,5 @@
 //! The events of a step as messages, and as events for observers.
 
-use std::fmt;
-
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
@@ -40,9 +38,26 @@ use crate::physics::Physics;
 /// assert_eq!(app.world().resource::<Touches>().0, 1);
 /// # Ok::<(), bevy_drystone::drystone::Error>(())
 /// ```
+///
+/// ```
+/// use bevy_drystone::prelude::*;
+/// use bevy_ecs::prelude::*;
+///
+/// fn score(mut enters: MessageReader<SensorEnter>, mut exits: MessageReader<SensorExit>) {
+///     let inside = enters.read().count() as i32 - exits.read().count() as i32;
+///     println!("{inside} more bodies in sensors");
+/// }
+///
+/// fn sound(mut hits: MessageReader<CollisionHit>, mut ends: MessageReader<CollisionEnd>, mut breaks: MessageReader<JointBreak>) {
+///     hits.read().for_each(|hit| println!("{} meets {} at {} m/s", hit.entity, hit.other, hit.speed));
+///     ends.read().for_each(|end| println!("{} leaves {}", end.entity, end.other));
+///     breaks.read().for_each(|joint| println!("{} broke at {} N", joint.entity, joint.force));
+/// }
+/// # bevy_app::App::new().add_systems(bevy_app::Update, (score, sound));
+/// ```
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CollisionStart {
-    /// The body that the observer watches; in a message, the body that entered the world first.
+    /// The body that the observer watches; in a message, the body with the smaller index in the world.
     pub entity: Entity,
     /// The other body.
     pub other: Entity,
@@ -55,7 +70,7 @@ pub struct CollisionStart {
 /// Two bodies no longer touch, or one of them is gone.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CollisionEnd {
-    /// The body that the observer watches; in a message, the body that entered the world first.
+    /// The body that the observer watches; in a message, the body with the smaller index in the world.
     pub entity: Entity,
     /// The other body.
     pub other: Entity,
@@ -68,7 +83,7 @@ pub struct CollisionEnd {
 /// Two bodies met faster than [`Listen::hits_above`](drystone::Listen::hits_above).
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq)]
 pub struct CollisionHit {
-    /// The body that the observer watches; in a message, the body that entered the world first.
+    /// The body that the observer watches; in a message, the body with the smaller index in the world.
     pub entity: Entity,
     /// The other body.
     pub other: Entity,
@@ -114,27 +129,6 @@ pub struct JointBreak {
     pub force: f32,
 }
 
-/// What a body, a joint or a step cannot do, for example because a component is NaN. A change that is refused leaves
-/// the body as it was; a new body or joint enters the world when it is in order. The text is also logged.
-#[derive(Message, Clone, Debug, PartialEq, Eq)]
-pub struct PhysicsError {
-    /// The entity whose component is wrong, or `None` if the step failed as a whole.
-    pub entity: Option<Entity>,
-    /// The field and its range.
-    pub text: String,
-}
-
-impl fmt::Display for PhysicsError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.entity {
-            Some(entity) => write!(f, "entity {entity}: {}", self.text),
-            None => f.write_str(&self.text),
-        }
-    }
-}
-
-impl std::error::Error for PhysicsError {}
-
 /// Where events go.
 #[derive(SystemParam)]
 pub(crate) struct Outbox<'w, 's> {
@@ -149,7 +143,7 @@ pub(crate) struct Outbox<'w, 's> {
 }
 
 pub(crate) fn register(app: &mut App) {
-    app.add_message::<PhysicsError>().add_message::<JointBreak>();
+    app.add_message::<JointBreak>();
     app.add_message::<CollisionStart>().add_message::<CollisionEnd>().add_message::<CollisionHit>();
     app.add_message::<SensorEnter>().add_message::<SensorExit>();
 }

@@ -14,6 +14,17 @@ use crate::physics::Physics;
 pub struct PhysicsGizmos;
 
 /// Draws [`debug_lines`] in each frame. Add it after Bevy's `GizmoPlugin`, which is among the default plugins.
+///
+/// ```
+/// use bevy_app::App;
+/// use bevy_drystone::{DrystonePlugin, PhysicsGizmos, PhysicsGizmosPlugin};
+/// use bevy_gizmos::config::GizmoConfigStore;
+///
+/// let mut app = App::new();
+/// app.add_plugins((DrystonePlugin, PhysicsGizmosPlugin));
+/// // Hidden until a key shows them.
+/// app.world_mut().resource_mut::<GizmoConfigStore>().config_mut::<PhysicsGizmos>().0.enabled = false;
+/// ```
 pub struct PhysicsGizmosPlugin;
 
 impl Plugin for PhysicsGizmosPlugin {

@@ -6,7 +6,7 @@ use bevy_math::Vec3;
 use drystone::{Body, World as Bodies};
 
 use crate::components::Order;
-use crate::events::PhysicsError;
+use crate::error::PhysicsError;
 use crate::physics::{Physics, Waiting};
 
 /// A joint between two bodies, or between a body and the world. It is a component of an entity of its own, or of one

@@ -47,10 +47,12 @@
 mod components;
 mod debug;
 mod ease;
+mod error;
 mod events;
 #[cfg(feature = "gizmos")]
 mod gizmos;
 mod joint;
+mod observe;
 mod physics;
 mod query;
 mod read;
@@ -64,7 +66,8 @@ pub use components::{
 };
 pub use debug::{DebugLine, debug_lines};
 pub use drystone;
-pub use events::{CollisionEnd, CollisionHit, CollisionStart, JointBreak, PhysicsError, SensorEnter, SensorExit};
+pub use error::PhysicsError;
+pub use events::{CollisionEnd, CollisionHit, CollisionStart, JointBreak, SensorEnter, SensorExit};
 #[cfg(feature = "gizmos")]
 pub use gizmos::{PhysicsGizmos, PhysicsGizmosPlugin};
 pub use joint::Joint;
@@ -120,9 +123,9 @@ pub enum PhysicsSystems {
 impl Plugin for DrystonePlugin {
     fn build(&self, app: &mut App) {
         use PhysicsSystems::{Read, Step, Write};
-        app.init_resource::<Physics>().init_resource::<Time<Fixed>>();
+        app.init_resource::<Physics>().init_resource::<Time<Fixed>>().add_message::<PhysicsError>();
         events::register(app);
-        physics::register(app);
+        observe::register(app);
         app.configure_sets(FixedPostUpdate, (Read, Step, Write).chain());
         let read = (read::settings, read::motion, read::bodies, joint::read).chain();
         app.add_systems(

@@ -1,14 +1,11 @@
 //! The simulation, and which entity each body and joint belongs to.
 
-use bevy_app::App;
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 use bevy_math::{Quat, Vec3};
 use drystone::{Body, BodyHandle, JointHandle, Simulation, StepStats, World as Bodies};
 
-use crate::components::{Optional, RigidBody, Sleeping};
-use crate::events::PhysicsError;
-use crate::joint::Joint;
+use crate::error::PhysicsError;
 
 /// The simulation, and its bodies and joints by their entities.
 ///
@@ -26,6 +23,27 @@ use crate::joint::Joint;
 /// let mut app = App::new();
 /// app.insert_resource(Physics::new(simulation)).add_plugins(DrystonePlugin);
 /// # Ok::<(), bevy_drystone::drystone::Error>(())
+/// ```
+///
+/// ```
+/// use bevy_app::{App, FixedMain};
+/// use bevy_drystone::prelude::*;
+/// use bevy_math::Vec3;
+///
+/// let mut app = App::new();
+/// app.add_plugins(DrystonePlugin);
+/// let lamp = app.world_mut().spawn((RigidBody::Dynamic, Collider::from(Shape::ball(0.1)), Mass(2.0))).id();
+/// let rope = app.world_mut().spawn(Joint::to_world(lamp, Vec3::ZERO, Vec3::Y).with(|joint| joint.rope(1.0))).id();
+/// (0..64).for_each(|_| app.world_mut().run_schedule(FixedMain));
+/// let physics = app.world().resource::<Physics>();
+/// // The lamp hangs still.
+/// assert!(physics.error().is_none() && physics.stats().asleep == 1);
+/// // From entities to bodies and joints, and back.
+/// let (body, joint) = (physics.handle(lamp).expect("a body"), physics.joint_handle(rope).expect("a joint"));
+/// assert_eq!(physics.entity(body), Some(lamp));
+/// assert_eq!(physics.body(lamp).expect("a body").mass.mass, 2.0);
+/// let force = physics.simulation.joint_force(joint).expect("it took part in the step");
+/// assert!((force.y.abs() - 2.0 * 9.81).abs() < 0.1, "{force} N");
 /// ```
 #[derive(Resource)]
 pub struct Physics {
@@ -182,7 +200,8 @@ impl Physics {
         self.tables.joints.get(&entity).copied()
     }
 
-    /// The entity of a body, for contacts of the simulation; `None` for a body without an entity.
+    /// The entity of a body, for contacts of the simulation, also if the body left since the last step. `None` for a
+    /// body without an entity.
     pub fn entity(&self, body: BodyHandle) -> Option<Entity> {
         self.tables.entity(body)
     }
@@ -233,42 +252,4 @@ impl Physics {
         log::error!("{error}");
         errors.write(error);
     }
-}
-
-/// Adds the observers that keep the tables, and takes over the bodies and joints that are there.
-pub(crate) fn register(app: &mut App) {
-    app.add_observer(|added: On<Add<RigidBody>>, mut physics: ResMut<Physics>| {
-        physics.tables.new_bodies.push(Waiting::new(added.entity));
-    });
-    app.add_observer(|removed: On<Remove<RigidBody>>, mut physics: ResMut<Physics>| {
-        let Physics { simulation, tables, .. } = &mut *physics;
-        tables.remove_body(removed.entity, &mut simulation.world);
-    });
-    app.add_observer(|added: On<Add<Joint>>, mut physics: ResMut<Physics>| {
-        physics.tables.new_joints.push(Waiting::new(added.entity));
-    });
-    app.add_observer(|removed: On<Remove<Joint>>, mut physics: ResMut<Physics>| {
-        let Physics { simulation, tables, .. } = &mut *physics;
-        tables.remove_joint(removed.entity, &mut simulation.world);
-    });
-    app.add_observer(|removed: On<Remove<Optional>>, mut physics: ResMut<Physics>| {
-        physics.tables.stripped.push(removed.entity);
-    });
-    app.add_observer(|removed: On<Remove<Sleeping>>, mut physics: ResMut<Physics>| {
-        if let Some(body) = physics.handle(removed.entity) {
-            physics.simulation.wake(body.index());
-        }
-    });
-    let world = app.world_mut();
-    let bodies = sorted(world.query_filtered::<Entity, With<RigidBody>>().iter(world));
-    let joints = sorted(world.query_filtered::<Entity, With<Joint>>().iter(world));
-    let mut physics = world.resource_mut::<Physics>();
-    physics.tables.new_bodies.extend(bodies);
-    physics.tables.new_joints.extend(joints);
-}
-
-fn sorted(entities: impl Iterator<Item = Entity>) -> Vec<Waiting> {
-    let mut entities: Vec<_> = entities.collect();
-    entities.sort_unstable();
-    entities.into_iter().map(Waiting::new).collect()
 }

@@ -91,6 +91,33 @@ pub struct SpatialHit {
 }
 
 /// A view of all bodies, for many queries: [`SpatialQuery::view`]. A query meets nothing if it has a NaN.
+///
+/// ```
+/// use bevy_app::{App, FixedMain};
+/// use bevy_drystone::{SpatialHit, SpatialView, prelude::*};
+/// use bevy_ecs::{prelude::*, system::RunSystemOnce};
+/// use bevy_math::{Quat, Vec3};
+///
+/// let mut app = App::new();
+/// app.add_plugins(DrystonePlugin);
+/// let rock = app.world_mut().spawn((RigidBody::Static, Collider::from(Shape::ball(1.0)))).id();
+/// app.world_mut().run_schedule(FixedMain);
+/// let ask = move |space: SpatialQuery| {
+///     let (view, all): (SpatialView, _) = (space.view(), SpatialFilter::default());
+///     let (from, to) = (Vec3::NEG_X * 5.0, Vec3::X);
+///     let SpatialHit { entity, distance, .. } = view.ray(from, to, 10.0, &all).expect("the rock");
+///     assert!(entity == rock && (distance - 4.0).abs() < 1e-3);
+///     assert_eq!(view.ray_all(from, to, 10.0, &all).len(), 1);
+///     let cube = Shape::cuboid(0.5, 0.5, 0.5);
+///     let stop = view.cast(&cube, from, Quat::IDENTITY, to, 10.0, &all).expect("the rock");
+///     assert!((stop.distance - 3.5).abs() < 1e-3);
+///     assert!((view.closest(from, 10.0, &all).expect("the rock").distance - 4.0).abs() < 1e-3);
+///     assert_eq!(view.point(Vec3::X * 0.5, &all), [(rock, 0)]);
+///     assert_eq!(view.intersecting(&cube, Vec3::X * 1.2, Quat::IDENTITY, &all), [(rock, 0)]);
+///     assert_eq!(view.overlapping(Vec3::ZERO, Vec3::ONE, &all), [(rock, 0)]);
+/// };
+/// app.world_mut().run_system_once(ask).expect("it runs");
+/// ```
 pub struct SpatialView<'a> {
     physics: &'a Physics,
     queries: Queries<'a>,

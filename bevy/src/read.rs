@@ -5,7 +5,7 @@ use bevy_transform::components::Transform;
 use drystone::Body;
 
 use crate::components::{AngularVelocity, AnyChanged, LinearVelocity, Order, Settings};
-use crate::events::PhysicsError;
+use crate::error::PhysicsError;
 use crate::physics::{Motion, Physics};
 
 /// Takes over changes of everything but motion. A body that a change would spoil stays as it is.

@@ -42,7 +42,7 @@ impl Physics {
     ///
     /// ```
     /// use bevy_app::{App, FixedMain};
-    /// use bevy_drystone::prelude::*;
+    /// use bevy_drystone::{PhysicsSnapshot, prelude::*};
     /// use bevy_ecs::prelude::*;
     ///
     /// let mut app = App::new();
@@ -57,7 +57,9 @@ impl Physics {
     /// assert_ne!(after.hash(), before.hash());
     /// Physics::restore(app.world_mut(), &before);
     /// step(app.world_mut());
-    /// assert_eq!(app.world().resource::<Physics>().snapshot().hash(), after.hash());
+    /// let mut again: PhysicsSnapshot = before.clone();
+    /// app.world().resource::<Physics>().snapshot_into(&mut again);
+    /// assert_eq!(again.hash(), after.hash());
     /// ```
     pub fn snapshot(&self) -> PhysicsSnapshot {
         PhysicsSnapshot { state: self.simulation.snapshot(), tables: self.tables.clone() }

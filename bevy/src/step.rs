@@ -5,7 +5,7 @@ use bevy_time::{Fixed, Time};
 use bevy_transform::components::Transform;
 
 use crate::components::{AngularVelocity, LinearVelocity, Sleeping};
-use crate::events::PhysicsError;
+use crate::error::PhysicsError;
 use crate::physics::{Motion, Physics};
 
 /// Steps by the length of the fixed step.
