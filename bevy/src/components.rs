@@ -55,7 +55,8 @@ pub enum RigidBody {
 /// use bevy_math::{Quat, Vec3};
 ///
 /// let ball = Collider::from(Shape::ball(0.5));
-/// let hammer = Collider::from(Shape::cylinder(0.4, 0.02)).with(Shape::cuboid(0.1, 0.05, 0.05), Vec3::Y * 0.4, Quat::IDENTITY);
+/// let head = Shape::cuboid(0.1, 0.05, 0.05);
+/// let hammer = Collider::from(Shape::cylinder(0.4, 0.02)).with(head, Vec3::Y * 0.4, Quat::IDENTITY);
 /// assert_eq!((ball.0.len(), hammer.0.len()), (1, 2));
 /// ```
 #[derive(Component, Clone, Debug, Default)]

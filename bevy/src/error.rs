@@ -18,7 +18,8 @@ use bevy_ecs::prelude::*;
 /// let ball = (RigidBody::Dynamic, Collider::from(Shape::ball(0.5)), LinearVelocity(Vec3::NAN));
 /// let ball = app.world_mut().spawn(ball).id();
 /// app.world_mut().run_schedule(FixedMain);
-/// let error: PhysicsError = app.world_mut().resource_mut::<Messages<PhysicsError>>().drain().next().expect("it is NaN");
+/// let mut errors = app.world_mut().resource_mut::<Messages<PhysicsError>>();
+/// let error: PhysicsError = errors.drain().next().expect("it is NaN");
 /// assert_eq!(error.entity, Some(ball));
 /// assert!(error.text.starts_with("linear velocity = [NaN, NaN, NaN]"), "{error}");
 /// ```

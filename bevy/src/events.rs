@@ -19,6 +19,7 @@ use crate::physics::Physics;
 /// use bevy_drystone::prelude::*;
 /// use bevy_ecs::prelude::*;
 /// use bevy_time::{TimePlugin, TimeUpdateStrategy};
+/// use bevy_transform::prelude::*;
 ///
 /// /// How often the bodies touched.
 /// #[derive(Resource, Default)]
@@ -28,7 +29,7 @@ use crate::physics::Physics;
 /// app.add_plugins((TimePlugin, DrystonePlugin)).init_resource::<Touches>();
 /// app.world_mut().resource_mut::<Physics>().simulation.listen(Listen { contacts: true, ..Listen::default() })?;
 /// app.world_mut().spawn((RigidBody::Static, Collider::from(Shape::ball(1.0))));
-/// let ball = (RigidBody::Dynamic, Collider::from(Shape::ball(0.5)), bevy_transform::prelude::Transform::from_xyz(0.0, 1.6, 0.0));
+/// let ball = (RigidBody::Dynamic, Collider::from(Shape::ball(0.5)), Transform::from_xyz(0.0, 1.6, 0.0));
 /// app.world_mut().spawn(ball).observe(|touch: On<CollisionStart>, mut touches: ResMut<Touches>| {
 ///     assert_ne!(touch.entity, touch.other);
 ///     touches.0 += 1;
@@ -48,12 +49,15 @@ use crate::physics::Physics;
 ///     println!("{inside} more bodies in sensors");
 /// }
 ///
-/// fn sound(mut hits: MessageReader<CollisionHit>, mut ends: MessageReader<CollisionEnd>, mut breaks: MessageReader<JointBreak>) {
+/// fn hear(mut hits: MessageReader<CollisionHit>) {
 ///     hits.read().for_each(|hit| println!("{} meets {} at {} m/s", hit.entity, hit.other, hit.speed));
+/// }
+///
+/// fn see(mut ends: MessageReader<CollisionEnd>, mut breaks: MessageReader<JointBreak>) {
 ///     ends.read().for_each(|end| println!("{} leaves {}", end.entity, end.other));
 ///     breaks.read().for_each(|joint| println!("{} broke at {} N", joint.entity, joint.force));
 /// }
-/// # bevy_app::App::new().add_systems(bevy_app::Update, (score, sound));
+/// # bevy_app::App::new().add_systems(bevy_app::Update, (score, hear, see));
 /// ```
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CollisionStart {

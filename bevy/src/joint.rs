@@ -23,7 +23,8 @@ use crate::physics::{Physics, Waiting};
 ///
 /// let mut world = World::new();
 /// let [wall, door] = [RigidBody::Static, RigidBody::Dynamic].map(|body| world.spawn(body).id());
-/// let hinge = Joint::new(door, Vec3::X * -0.5, wall, Vec3::X * 0.1).with(|joint| joint.hinge(Vec3::Y).limited(0.0, 1.5));
+/// let hinge = Joint::new(door, Vec3::X * -0.5, wall, Vec3::X * 0.1);
+/// let hinge = hinge.with(|joint| joint.hinge(Vec3::Y).limited(0.0, 1.5));
 /// let hinge = world.spawn(hinge).id();
 /// let lamp = world.spawn(RigidBody::Dynamic).id();
 /// let rope = world.spawn(Joint::to_world(lamp, Vec3::ZERO, Vec3::Y * 3.0).with(|joint| joint.rope(1.0))).id();
