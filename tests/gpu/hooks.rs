@@ -59,8 +59,8 @@ struct Hooks<F, M>(F, M);
 
 impl<F, M> ContactHooks for Hooks<F, M>
 where
-    F: FnMut(&World, usize, usize) -> bool + Send,
-    M: FnMut(&World, &mut PendingContact) + Send,
+    F: FnMut(&World, usize, usize) -> bool + Send + Sync,
+    M: FnMut(&World, &mut PendingContact) + Send + Sync,
 {
     fn may_touch(&mut self, world: &World, a: ColliderOf, b: ColliderOf) -> bool {
         self.0(world, a.body.index(), b.body.index())
