@@ -13,7 +13,7 @@ use crate::physics::Physics;
 #[derive(Default, Reflect, GizmoConfigGroup)]
 pub struct PhysicsGizmos;
 
-/// Draws [`debug_lines`] in each frame. Add it after Bevy's `GizmoPlugin`, which is among the default plugins.
+/// Draws [`debug_lines`] in each frame. It needs Bevy's `GizmoPlugin`, which is among the default plugins.
 ///
 /// ```
 /// use bevy_app::App;
