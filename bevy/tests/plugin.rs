@@ -236,6 +236,25 @@ fn a_transform_and_a_velocity_that_a_program_sets_move_the_body() {
     assert!((place(&app, entity) - Vec3::new(8.0, 3.0, 5.0)).length() < 1e-3, "{}", place(&app, entity));
 }
 
+#[test]
+fn a_kinematic_body_moves_as_told_and_carries_others() {
+    let mut app = app();
+    let lift = (RigidBody::Kinematic, Collider::from(Shape::cuboid(2.0, 0.5, 2.0)), LinearVelocity(Vec3::Y));
+    let lift = spawn(&mut app, lift);
+    let rider = spawn(&mut app, ball(0.0, 1.0));
+    step(&mut app, 64);
+    assert!((place(&app, lift).y - 1.0).abs() < 1e-4, "{}", place(&app, lift));
+    assert!((place(&app, rider).y - 2.0).abs() < 0.01, "{}", place(&app, rider));
+    // To a pose within a step, by the body itself.
+    let to = move |mut physics: ResMut<Physics>| {
+        physics.body_mut(lift).expect("a body").move_to(Vec3::Y * 1.1, Quat::IDENTITY, 1.0 / 64.0);
+    };
+    app.world_mut().run_system_once(to).expect("it runs");
+    step(&mut app, 1);
+    assert!((place(&app, lift).y - 1.1).abs() < 1e-4, "{}", place(&app, lift));
+    assert!((get::<LinearVelocity>(&app, lift).0.y - 6.4).abs() < 1e-3);
+}
+
 /// How often transforms changed.
 #[derive(Resource, Default)]
 struct Changes(usize);
