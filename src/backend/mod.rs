@@ -48,7 +48,7 @@ pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + '
 /// assert!(pollster::block_on(backend.successor_async()).is_none());
 /// # Ok::<(), drystone::Error>(())
 /// ```
-pub trait Backend: Send {
+pub trait Backend: Send + Sync {
     /// One of `reference`, `cpu` and `gpu`.
     fn name(&self) -> &'static str;
 

@@ -55,7 +55,7 @@ use crate::world::{Body, Material, World};
 /// assert!(speed(rough).abs() < 1e-3 && (speed(icy) - 1.0).abs() < 1e-3 && (speed(ghost) - 1.0).abs() < 1e-3);
 /// # Ok::<(), drystone::Error>(())
 /// ```
-pub trait ContactHooks: Send {
+pub trait ContactHooks: Send + Sync {
     /// Whether two colliders may touch in this step. `a` belongs to the body with the smaller index. Before a step
     /// computes contacts, it asks for every pair whose boxes overlap and that has an awake or moving body. A refused
     /// pair costs nothing more, and its bodies pass through each other at any speed. Groups and joints are checked

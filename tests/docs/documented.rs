@@ -1,6 +1,6 @@
 //! Every public type and function has an example that compiles.
 //!
-//! The rule: a struct, enum, trait, function or method that a user of the engine, of scenes, problems or conform can name stands in an example, as a word. That is an example in
+//! The rule: a struct, enum, trait, function or method that a user of the engine, of scenes, problems, conform or the plugin for Bevy can name stands in an example, as a word. That is an example in
 //! the documentation of its own source file, or of a method or the declaration of its type in any file; documentation tests compile and run all of
 //! them, and compile those that need a device (`no_run`). Constants and type aliases need none. The stages one by one (`drystone::stages`) are for tests and measurements and need none.
 
@@ -180,7 +180,7 @@ fn texts_of(folder: &Path, texts: &mut BTreeMap<PathBuf, String>) {
 #[test]
 fn every_public_type_and_function_stands_in_an_example() {
     let (mut count, mut unshown) = (0, Vec::new());
-    for folder in ["src", "scenes/src", "problems/src", "conform/src"] {
+    for folder in ["src", "scenes/src", "problems/src", "conform/src", "bevy/src"] {
         let root = Path::new(crate::ROOT).join(folder);
         let mut texts = BTreeMap::new();
         texts_of(&root, &mut texts);

@@ -43,6 +43,15 @@ const VIEW: &[&[&str]] = &[
     &["film", "live_show"],
 ];
 
+/// The modules of the plugin for Bevy, above the engine.
+const BEVY: &[&[&str]] = &[
+    &["components", "error"],
+    &["physics"],
+    &["debug", "ease", "events", "joint", "query", "read", "step"],
+    &["gizmos", "observe", "rollback"],
+    &["prelude"],
+];
+
 /// The modules of the command, above all others.
 const COMMAND: &[&[&str]] =
     &[&["adapter", "files", "settings"], &["hard"], &["report", "soak"], &["view"], &["commands"]];
@@ -50,13 +59,14 @@ const COMMAND: &[&[&str]] =
 const LIB: &str = include_str!("../../src/lib.rs");
 
 /// The packages: the folder of each, the text of its root, its floors.
-const PACKAGES: [(&str, &str, &[&[&str]]); 7] = [
+const PACKAGES: [(&str, &str, &[&[&str]]); 8] = [
     ("src", LIB, LIBRARY),
     ("scenes/src", include_str!("../../scenes/src/lib.rs"), SCENES),
     ("problems/src", include_str!("../../problems/src/lib.rs"), PROBLEMS),
     ("conform/src", include_str!("../../conform/src/lib.rs"), CONFORM),
     ("maze/src", include_str!("../../maze/src/lib.rs"), MAZE),
     ("view/src", include_str!("../../view/src/lib.rs"), VIEW),
+    ("bevy/src", include_str!("../../bevy/src/lib.rs"), BEVY),
     ("cli/src", include_str!("../../cli/src/lib.rs"), COMMAND),
 ];
 

@@ -59,8 +59,8 @@ struct Hooks<F, M>(F, M);
 
 impl<F, M> ContactHooks for Hooks<F, M>
 where
-    F: FnMut(&World, usize, usize) -> bool + Send,
-    M: FnMut(&World, &mut PendingContact) + Send,
+    F: FnMut(&World, usize, usize) -> bool + Send + Sync,
+    M: FnMut(&World, &mut PendingContact) + Send + Sync,
 {
     fn may_touch(&mut self, world: &World, a: ColliderOf, b: ColliderOf) -> bool {
         self.0(world, a.body.index(), b.body.index())
@@ -77,11 +77,13 @@ fn all(_: &World, _: usize, _: usize) -> bool {
 
 fn nothing(_: &World, _: &mut PendingContact) {}
 
-fn filtering(filter: impl FnMut(&World, usize, usize) -> bool + Send + 'static) -> Option<Box<dyn ContactHooks>> {
+fn filtering(
+    filter: impl FnMut(&World, usize, usize) -> bool + Send + Sync + 'static,
+) -> Option<Box<dyn ContactHooks>> {
     Some(Box::new(Hooks(filter, nothing)))
 }
 
-fn modifying(modify: impl FnMut(&World, &mut PendingContact) + Send + 'static) -> Option<Box<dyn ContactHooks>> {
+fn modifying(modify: impl FnMut(&World, &mut PendingContact) + Send + Sync + 'static) -> Option<Box<dyn ContactHooks>> {
     Some(Box::new(Hooks(all, modify)))
 }
 

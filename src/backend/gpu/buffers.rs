@@ -2,6 +2,7 @@
 //! it knows.
 
 use std::pin::Pin;
+use std::sync::{Mutex, PoisonError};
 
 use futures_channel::oneshot;
 use rayon::prelude::*;
@@ -25,8 +26,8 @@ pub(super) struct Buffers {
     /// Largest total memory of all buffers (B).
     memory: u64,
     slots: Vec<Slot>,
-    /// New buffers. The device has not yet confirmed their memory.
-    created: Vec<Created>,
+    /// New buffers. The device has not yet confirmed their memory. Nobody waits for the lock: it makes futures `Sync`.
+    created: Mutex<Vec<Created>>,
     /// A buffer that the device writes and the processor reads. One is enough: the host waits for every read-back
     /// before the next submission.
     staging: Option<wgpu::Buffer>,
@@ -60,7 +61,7 @@ impl Buffers {
             limit,
             memory,
             slots,
-            created: Vec::new(),
+            created: Mutex::default(),
             staging: None,
             generation: 0,
             sent: 0,
@@ -174,10 +175,14 @@ impl Buffers {
         places.zip(rows).for_each(|(place, row)| place.copy_from_slice(bytemuck::bytes_of(&row)));
     }
 
+    fn created(&mut self) -> &mut Vec<Created> {
+        self.created.get_mut().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Waits until the device has confirmed the memory of each new buffer.
     pub async fn settle(&mut self) -> Result<()> {
         let mut refusals = Vec::new();
-        for Created { refusal, is_refused } in std::mem::take(&mut self.created) {
+        for Created { refusal, is_refused } in std::mem::take(self.created()) {
             if is_refused.await.is_some() {
                 refusals.push(refusal);
             }
@@ -257,7 +262,7 @@ impl Buffers {
         if is_full {
             return Err(refusal);
         }
-        self.created.push(Created { refusal, is_refused: Box::pin(scope.pop()) });
+        self.created().push(Created { refusal, is_refused: Box::pin(scope.pop()) });
         Ok(buffer)
     }
 }
