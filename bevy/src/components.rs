@@ -24,7 +24,7 @@ use drystone::{Body, BodyKind, Groups, MassProperties, Shape};
 /// let bird = app.world_mut().spawn((
 ///     (RigidBody::Dynamic, Collider::from(Shape::capsule(0.1, 0.05)), Transform::from_xyz(0.0, 3.0, 0.0)),
 ///     (LinearVelocity(Vec3::X * 4.0), AngularVelocity(Vec3::Y), Mass(0.3), GravityScale(0.0)),
-///     (LinearDamping(0.1), AngularDamping(2.0), LockedRotations([true, false, true]), SweptCcd),
+///     (LinearDamping(0.1), AngularDamping(2.0), LockedAxes { rotations: [true, false, true], ..LockedAxes::default() }, SweptCcd),
 ///     (ConstantForce(Vec3::X * 0.1), ConstantTorque(Vec3::ZERO), CollisionLayers::default()),
 ///     (SleepingDisabled, TransformInterpolation, Order(7)),
 /// ));
@@ -121,9 +121,22 @@ pub struct LinearDamping(pub f32);
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq)]
 pub struct AngularDamping(pub f32);
 
-/// The world axes x, y, z about which a body does not rotate.
+/// The world axes x, y, z about which a body does not rotate, and along which its center of mass does not move.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LockedRotations(pub [bool; 3]);
+pub struct LockedAxes {
+    /// Whether rotation about x, y, z is locked.
+    pub rotations: [bool; 3],
+    /// Whether translation along x, y, z is locked.
+    pub translations: [bool; 3],
+}
+
+/// Largest speed of the center of mass at the start and the end of a step (m/s).
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub struct MaxLinearSpeed(pub f32);
+
+/// Largest angular speed at the start and the end of a step (rad/s).
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub struct MaxAngularSpeed(pub f32);
 
 /// The layers that a body belongs to, and those that it collides with: one bit for each of 32 layers. Two bodies
 /// collide if each one belongs to a layer that the other collides with. Without this component all bits are set.
@@ -207,7 +220,9 @@ pub(crate) struct Settings {
     gravity_scale: Option<&'static GravityScale>,
     linear_damping: Option<&'static LinearDamping>,
     angular_damping: Option<&'static AngularDamping>,
-    locked_rotations: Option<&'static LockedRotations>,
+    locked_axes: Option<&'static LockedAxes>,
+    max_linear_speed: Option<&'static MaxLinearSpeed>,
+    max_angular_speed: Option<&'static MaxAngularSpeed>,
     layers: Option<&'static CollisionLayers>,
     force: Option<&'static ConstantForce>,
     torque: Option<&'static ConstantTorque>,
@@ -226,7 +241,8 @@ pub(crate) type Optional = (
     GravityScale,
     LinearDamping,
     AngularDamping,
-    LockedRotations,
+    LockedAxes,
+    (MaxLinearSpeed, MaxAngularSpeed),
     CollisionLayers,
     ConstantForce,
     ConstantTorque,
@@ -238,7 +254,8 @@ pub(crate) type Optional = (
 /// Whether one of [`Settings`] changed.
 pub(crate) type AnyChanged = Or<(
     Or<(Changed<RigidBody>, Changed<Collider>, Changed<Mass>, Changed<ColliderDensity>, Changed<ContactMaterial>)>,
-    Or<(Changed<GravityScale>, Changed<LinearDamping>, Changed<AngularDamping>, Changed<LockedRotations>)>,
+    Or<(Changed<GravityScale>, Changed<LinearDamping>, Changed<AngularDamping>, Changed<LockedAxes>)>,
+    Or<(Changed<MaxLinearSpeed>, Changed<MaxAngularSpeed>)>,
     Or<(Changed<CollisionLayers>, Changed<ConstantForce>, Changed<ConstantTorque>, Changed<Sensor>)>,
     Or<(Changed<SleepingDisabled>, Changed<SweptCcd>)>,
 )>;
@@ -259,7 +276,10 @@ impl SettingsItem<'_, '_> {
         body.gravity_scale = self.gravity_scale.map_or(default.gravity_scale, |scale| scale.0);
         body.linear_damping = self.linear_damping.map_or(default.linear_damping, |rate| rate.0);
         body.angular_damping = self.angular_damping.map_or(default.angular_damping, |rate| rate.0);
-        body.locked_rotations = self.locked_rotations.map_or(default.locked_rotations, |axes| axes.0);
+        let LockedAxes { rotations, translations } = self.locked_axes.copied().unwrap_or_default();
+        (body.locked_rotations, body.locked_translations) = (rotations, translations);
+        body.max_linear_speed = self.max_linear_speed.map_or(default.max_linear_speed, |speed| speed.0);
+        body.max_angular_speed = self.max_angular_speed.map_or(default.max_angular_speed, |speed| speed.0);
         body.groups = self.layers.map_or(default.groups, |&layers| layers.into());
         body.force = self.force.map_or(default.force, |force| force.0);
         body.torque = self.torque.map_or(default.torque, |torque| torque.0);

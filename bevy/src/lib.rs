@@ -61,8 +61,8 @@ mod step;
 
 pub use components::{
     AngularDamping, AngularVelocity, Collider, ColliderDensity, CollisionLayers, ConstantForce, ConstantTorque,
-    ContactMaterial, GravityScale, LinearDamping, LinearVelocity, LockedRotations, Mass, Order, RigidBody, Sensor,
-    Sleeping, SleepingDisabled, SweptCcd, TransformInterpolation,
+    ContactMaterial, GravityScale, LinearDamping, LinearVelocity, LockedAxes, Mass, MaxAngularSpeed, MaxLinearSpeed,
+    Order, RigidBody, Sensor, Sleeping, SleepingDisabled, SweptCcd, TransformInterpolation,
 };
 pub use debug::{DebugLine, debug_lines};
 pub use drystone;
@@ -84,9 +84,9 @@ pub mod prelude {
     pub use crate::{
         AngularDamping, AngularVelocity, Collider, ColliderDensity, CollisionEnd, CollisionHit, CollisionLayers,
         CollisionStart, ConstantForce, ConstantTorque, ContactMaterial, DrystonePlugin, GravityScale, Joint,
-        JointBreak, LinearDamping, LinearVelocity, LockedRotations, Mass, Physics, PhysicsError, PhysicsSystems,
-        RigidBody, Sensor, SensorEnter, SensorExit, Sleeping, SleepingDisabled, SpatialFilter, SpatialQuery, SweptCcd,
-        TransformInterpolation,
+        JointBreak, LinearDamping, LinearVelocity, LockedAxes, Mass, MaxAngularSpeed, MaxLinearSpeed, Physics,
+        PhysicsError, PhysicsSystems, RigidBody, Sensor, SensorEnter, SensorExit, Sleeping, SleepingDisabled,
+        SpatialFilter, SpatialQuery, SweptCcd, TransformInterpolation,
     };
     pub use drystone::{Listen, Shape};
 }

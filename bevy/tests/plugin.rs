@@ -155,10 +155,18 @@ fn the_bits_are_those_of_the_library() {
 #[test]
 fn every_component_goes_in_and_out() {
     let mut app = app();
+    let locked = LockedAxes { rotations: [true, false, false], translations: [false, false, true] };
     let full = (
         (RigidBody::Dynamic, Collider::from(Shape::ball(0.5)), Mass(3.0), Transform::from_xyz(0.0, 5.0, 0.0)),
         (LinearVelocity(Vec3::X), AngularVelocity(Vec3::Y), GravityScale(0.5), LinearDamping(0.1), AngularDamping(0.2)),
-        (ConstantForce(Vec3::Z), ConstantTorque(Vec3::X), LockedRotations([true, false, false]), SweptCcd),
+        (
+            ConstantForce(Vec3::Z),
+            ConstantTorque(Vec3::X),
+            locked,
+            SweptCcd,
+            MaxLinearSpeed(90.0),
+            MaxAngularSpeed(80.0),
+        ),
         (CollisionLayers { memberships: 2, filters: 4 }, SleepingDisabled, Name::new("all")),
         ContactMaterial(Material { friction: 0.9, restitution: 0.3, ..Material::default() }),
     );
@@ -172,6 +180,8 @@ fn every_component_goes_in_and_out() {
     assert_eq!((body.mass.mass, body.gravity_scale, body.force, body.torque), (3.0, 0.5, Vec3::Z, Vec3::X));
     assert_eq!((body.linear_damping, body.angular_damping, body.swept), (0.1, 0.2, true));
     assert_eq!((body.locked_rotations, body.can_sleep), ([true, false, false], false));
+    assert_eq!((body.locked_translations, body.position.z), ([false, false, true], 0.0));
+    assert_eq!((body.max_linear_speed, body.max_angular_speed), (90.0, 80.0));
     assert_eq!((body.groups.membership, body.groups.filter, body.name.as_str()), (2, 4, "all"));
     assert_eq!((body.material.friction, body.material.restitution), (0.9, 0.3));
     // Out.

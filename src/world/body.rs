@@ -304,8 +304,8 @@ pub struct Body {
     /// gyroscopic torque. Only for dynamic bodies; no axis is locked by default.
     pub locked_rotations: [bool; 3],
     /// The world axes x, y, z along which the center of mass does not move. The next step removes any velocity along
-    /// them. Forces along them do nothing, and contacts bear on the body along them as on a fixed one. Only for dynamic
-    /// bodies; no axis is locked by default.
+    /// them. Forces along them do nothing, and contacts bear on the body along them as on a fixed one. A joint takes
+    /// some steps to bear what is heavier than the body. Only for dynamic bodies; no axis is locked by default.
     pub locked_translations: [bool; 3],
     /// Largest speed of the center of mass (m/s), 0 or more; infinite by default. Each step begins and ends with at most
     /// this speed. Only for dynamic bodies.
