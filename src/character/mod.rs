@@ -82,8 +82,11 @@ pub struct Ground {
     pub body: BodyHandle,
     /// Unit normal of the surface. At an edge it is the normal of the most level face.
     pub normal: Vec3,
-    /// The velocity of the ground at the feet (m/s).
+    /// The velocity of the ground at the feet, including that of its surface (m/s).
     pub velocity: Vec3,
+    /// The velocity of the surface relative to the body, as of a belt, in world axes (m/s): see
+    /// [`Material::surface_velocity`](crate::Material::surface_velocity).
+    pub surface_velocity: Vec3,
 }
 
 /// How a character moves in the next step: see [`Character::walk`].
@@ -101,7 +104,7 @@ pub struct Ground {
 /// character.walk(&mut simulation, Vec3::ZERO, 0.1)?;
 /// simulation.step(0.1)?;
 /// let Movement { translation, ground, contacts } = character.walk(&mut simulation, Vec3::ZERO, 0.1)?;
-/// let Some(Ground { body, normal, velocity }) = ground else { panic!("it fell off") };
+/// let Some(Ground { body, normal, velocity, .. }) = ground else { panic!("it fell off") };
 /// assert!(body == lift && (normal - Vec3::Y).length() < 1e-4 && (velocity - Vec3::Y).length() < 1e-4);
 /// assert!((translation - 0.1 * Vec3::Y).length() < 1e-4 && contacts.len() == 1);
 /// # Ok::<(), drystone::Error>(())
@@ -210,7 +213,8 @@ impl Character {
         };
         // The ground carries it along, past all other obstacles.
         let carried = around.carried(start);
-        let drift = carried / dt;
+        let belt = ground.surface_velocity - ground.surface_velocity.dot(ground.normal) * ground.normal;
+        let drift = carried / dt + belt;
         let from = if carried == Vec3::ZERO {
             start
         } else {
@@ -219,7 +223,7 @@ impl Character {
         // Along the surface, at the same speed.
         let along = walk - ground.normal.dot(walk) / ground.normal.dot(self.up) * self.up;
         let walk = along.normalize_or_zero() * walk.length();
-        let by = walk * dt;
+        let by = (walk + belt) * dt;
         let plain = around.glide(from, by, Footing::Feet);
         let missed = |at: Vec3| around.across(from + by - at).length();
         let landed = around.lower(plain.at, around.step, Footing::Feet);

@@ -279,13 +279,20 @@ impl<'a> Surroundings<'a> {
         let best = |a: &'_ Touch, b: &'_ Touch| level(b.upright) > level(a.upright);
         let carrier = near().filter(|touch| self.carries(touch, glide.at, footing));
         if let Some(touch) = carrier.reduce(|a, b| if best(a, b) { b } else { a }) {
-            return Some(Ground { body: touch.hit.body, normal: touch.upright, velocity: Vec3::ZERO });
+            return Some(self.ground_of(touch, touch.upright));
         }
         let spaces: Vec<HalfSpace> =
             near().map(|touch| HalfSpace { normal: touch.hit.normal.as_dvec3(), least: 0.0 }).collect();
         let is_held = nearest(-self.up.as_dvec3(), &spaces).is_some_and(|left| left.length() < HELD);
         let highest = near().reduce(|a, b| if level(b.hit.normal) > level(a.hit.normal) { b } else { a });
-        highest.filter(|_| is_held).map(|touch| Ground { body: touch.hit.body, normal: self.up, velocity: Vec3::ZERO })
+        highest.filter(|_| is_held).map(|touch| self.ground_of(touch, self.up))
+    }
+
+    /// A touched surface as ground at rest.
+    fn ground_of(&self, Touch { hit, .. }: &Touch, normal: Vec3) -> Ground {
+        let body = &self.world.bodies[hit.body.index()];
+        let surface_velocity = body.rotation * body.material_of(hit.collider).surface_velocity;
+        Ground { body: hit.body, normal, velocity: Vec3::ZERO, surface_velocity }
     }
 
     /// The part of a velocity that near surfaces allow (m/s).

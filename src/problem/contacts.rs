@@ -107,7 +107,7 @@ pub fn check_material(config: &SolverConfig, material: &Material) -> Result<()> 
     })
 }
 
-/// Common facts about the materials of a world.
+/// Common facts about the materials and the bodies of a world.
 #[derive(Clone, Copy, Debug, Default)]
 struct Materials {
     /// Whether any surface bounces.
@@ -118,9 +118,11 @@ struct Materials {
     rolls: bool,
     /// Whether any surface moves by itself.
     driven: bool,
+    /// Whether any body has locked translations.
+    locked: bool,
 }
 
-crate::saved::fields!(Materials { bounce, may_jam, rolls, driven });
+crate::saved::fields!(Materials { bounce, may_jam, rolls, driven, locked });
 
 impl Materials {
     fn among(all: impl Iterator<Item = Material> + Clone) -> Self {
@@ -129,21 +131,24 @@ impl Materials {
             may_jam: all.clone().any(|material| material.friction > MIN_JAMMING),
             rolls: all.clone().any(|material| material.rolls()),
             driven: all.clone().any(|material| material.is_driven()),
+            locked: false,
         }
     }
 
     fn of(world: &World) -> Self {
-        Self::among(world.bodies.iter().flat_map(Body::materials))
+        let locked = world.bodies.iter().any(Body::has_locked_translation);
+        Self { locked, ..Self::among(world.bodies.iter().flat_map(Body::materials)) }
     }
 
     /// The same facts with the materials of hooks.
     fn and(self, hooked: &[Option<Material>]) -> Self {
-        let Self { bounce, may_jam, rolls, driven } = Self::among(hooked.iter().flatten().copied());
+        let Self { bounce, may_jam, rolls, driven, .. } = Self::among(hooked.iter().flatten().copied());
         Self {
             bounce: self.bounce || bounce,
             may_jam: self.may_jam || may_jam,
             rolls: self.rolls || rolls,
             driven: self.driven || driven,
+            locked: self.locked,
         }
     }
 }
@@ -446,7 +451,7 @@ impl ContactRows {
         problem: &mut StepProblem,
     ) {
         let materials = self.materials.get_or_insert_with(|| Materials::of(world)).and(&self.hooked);
-        let Materials { bounce, may_jam, .. } = materials;
+        let Materials { bounce, may_jam, locked, .. } = materials;
         let layout = Layout::of(config, &materials);
         // The work of a driven surface follows from the impulses of the whole step.
         self.sums |= layout.driven;
@@ -455,7 +460,6 @@ impl ContactRows {
         problem.params.patches = layout.patches.into();
         problem.params.rolls = layout.rolls.into();
         problem.params.driven = layout.driven.into();
-        let locked = world.bodies.iter().any(Body::has_locked_translation);
         self.carry.surfaces = layout.rolls || layout.driven || locked;
         self.carry.approach = config.friction_rule() == FrictionRule::Slip || bounce;
         self.carry.tangents = matches!(config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);

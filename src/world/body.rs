@@ -970,7 +970,7 @@ impl Body {
     /// The material of the contact of two bodies, at colliders of these indices. Its surface velocity is that of b's
     /// surface relative to a's, beyond the motion of the bodies, in world axes.
     pub(crate) fn contact_material([a, b]: [&Self; 2], colliders: [u32; 2]) -> Material {
-        let [of_a, of_b] = [a.material_of(colliders[0]), b.material_of(colliders[1])];
+        let [of_a, of_b] = [a.material_of(colliders[0] as usize), b.material_of(colliders[1] as usize)];
         let both = of_a.combine(of_b);
         if !of_a.is_driven() && !of_b.is_driven() {
             return both;
@@ -978,8 +978,9 @@ impl Body {
         Material { surface_velocity: b.rotation * of_b.surface_velocity - a.rotation * of_a.surface_velocity, ..both }
     }
 
-    fn material_of(&self, collider: u32) -> Material {
-        self.colliders.get(collider as usize).and_then(|c| c.material).unwrap_or(self.material)
+    /// The material of one of its colliders.
+    pub(crate) fn material_of(&self, collider: usize) -> Material {
+        self.colliders.get(collider).and_then(|c| c.material).unwrap_or(self.material)
     }
 
     /// The materials of the body and of its colliders.

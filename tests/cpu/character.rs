@@ -565,3 +565,29 @@ fn a_character_without_a_good_body_is_refused_in_one_line() {
     let error = walk.character.walk(&mut walk.simulation, Vec3::X, DT).expect_err("refused");
     assert!(error.to_string().contains("was removed"), "{error}");
 }
+
+#[test]
+fn a_belt_takes_a_character_along_and_its_walk_adds_to_that() {
+    let mut world = World::new();
+    let belt = Body::fixed().shape(Shape::cuboid(20.0, 0.5, 2.0)).position(0.0, -0.5, 0.0);
+    let mut belt = belt.rotation(Quat::from_rotation_y(0.4));
+    belt.material.surface_velocity = Vec3::X * 1.5;
+    world.add(belt);
+    let along = Quat::from_rotation_y(0.4) * Vec3::X;
+    let mut walk = Walk::at(world, Vec3::Y * (MIDDLE + 0.01));
+    walk.steps(30, Vec3::ZERO);
+    let from = walk.position();
+    let ground = walk.steps(60, Vec3::ZERO).ground.expect("the belt");
+    assert!((ground.velocity - along * 1.5).length() < 1e-3, "{}", ground.velocity);
+    let stood = walk.position();
+    assert!((stood - from - along * 1.5).length() < 1e-2, "{}", stood - from);
+    walk.steps(60, along * -2.0);
+    let walked = walk.position() - stood;
+    assert!((walked + along * 0.5).length() < 1e-2, "{walked}");
+    // A jump keeps the velocity of the belt.
+    let before = walk.position();
+    walk.character.launch(Vec3::Y * 3.0);
+    walk.steps(12, Vec3::ZERO);
+    let flown = walk.position() - before;
+    assert!((flown - flown.y * Vec3::Y - along * 0.3).length() < 1e-2, "{flown}");
+}

@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use drystone::glam::{Quat, Vec3};
+use drystone::glam::{IVec3, Quat, Vec3};
 use drystone::{Body, Cpu, Groups, Shape, Simulation, SolverConfig, World};
 
 use crate::common::sample::is_full;
@@ -28,6 +28,8 @@ enum Floor {
     Parts,
     /// A body for each mesh of two triangles.
     Tiles,
+    /// A mesh of the surface of blocks.
+    Voxels,
 }
 
 impl Floor {
@@ -69,6 +71,12 @@ impl Floor {
                 let all = (0..EDGES).flat_map(|k| lanes.map(|z| middle(k, z)));
                 let body = all.fold(Body::fixed(), |body, at| body.shape_at(brick(), at, Quat::IDENTITY));
                 world.add(body.friction(1.0));
+            }
+            Self::Voxels => {
+                let half = EDGES as i32 / 2;
+                let cells: Vec<IVec3> = (-half..half).flat_map(|x| [-1, 0].map(|z| IVec3::new(x, -1, z))).collect();
+                let blocks = Shape::voxels(Vec3::new(PITCH, 1.0, HALF_WIDTH), &cells).expect("a mesh");
+                world.add(Body::fixed().shape(blocks).friction(1.0));
             }
             Self::Tiles => {
                 for (k, z) in (0..EDGES).flat_map(|k| lanes.map(|z| (k, z))) {
@@ -248,6 +256,11 @@ fn edges_of_boxes_cost_what_rolls_on_a_side_nothing() {
 #[test]
 fn edges_between_meshes_cost_nothing() {
     assert_edges_cost_nothing(Floor::Tiles, |_, _| true);
+}
+
+#[test]
+fn the_edges_of_voxels_cost_nothing() {
+    assert_edges_cost_nothing(Floor::Voxels, |_, _| true);
 }
 
 /// Edges that are not flush still stop bodies: a wall on the floor, a step, and the end of a row.

@@ -68,7 +68,8 @@ impl<C: Constraint> Load<'_, C> {
                 places.iter().rev().fold(0, |bits, body| bits << 1 | u16::from(is(body)))
             };
             lanes.movable = bits(&|body| body.is_movable);
-            lanes.locked = [0, 1, 2].map(|axis| bits(&|body| body.locked[axis]));
+            let any_locked = places.iter().any(|body| body.locked != [false; 3]);
+            lanes.locked = if any_locked { [0, 1, 2].map(|axis| bits(&|body| body.locked[axis])) } else { [0; 3] };
         }
     }
 

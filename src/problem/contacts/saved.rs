@@ -130,6 +130,7 @@ impl ContactRows {
         let poses = vec![PoseRow::default(); masses.len()];
         let rule = config.friction_rule();
         let carry = Carry { tangents: matches!(rule, FrictionRule::Box | FrictionRule::Disc), ..Carry::default() };
+        let facts = materials.unwrap_or_else(|| Materials::of(world)).and(hooked);
         let writer = Writer {
             world,
             detector,
@@ -144,8 +145,8 @@ impl ContactRows {
             brings_impulses: false,
             layout: *layout,
             hooked,
-            may_jam: materials.unwrap_or_else(|| Materials::of(world)).and(hooked).may_jam,
-            locked: world.bodies.iter().any(Body::has_locked_translation),
+            may_jam: facts.may_jam,
+            locked: facts.locked,
         };
         let slips = rule == FrictionRule::Slip && !layout.patches;
         let task = |first: usize| {
