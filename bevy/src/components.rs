@@ -24,7 +24,8 @@ use drystone::{Body, BodyKind, Groups, MassProperties, Shape};
 /// let bird = app.world_mut().spawn((
 ///     (RigidBody::Dynamic, Collider::from(Shape::capsule(0.1, 0.05)), Transform::from_xyz(0.0, 3.0, 0.0)),
 ///     (LinearVelocity(Vec3::X * 4.0), AngularVelocity(Vec3::Y), Mass(0.3), GravityScale(0.0)),
-///     (LinearDamping(0.1), AngularDamping(2.0), LockedAxes { rotations: [true, false, true], ..LockedAxes::default() }, SweptCcd),
+///     (LinearDamping(0.1), AngularDamping(2.0), MaxLinearSpeed(20.0), MaxAngularSpeed(9.0), SweptCcd),
+///     LockedAxes { rotations: [true, false, true], ..LockedAxes::default() },
 ///     (ConstantForce(Vec3::X * 0.1), ConstantTorque(Vec3::ZERO), CollisionLayers::default()),
 ///     (SleepingDisabled, TransformInterpolation, Order(7)),
 /// ));
