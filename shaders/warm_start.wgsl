@@ -22,8 +22,7 @@ fn warm_start_contact(rules: Rules, i: u32) {
         let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
         var turn = twist;
         if rules.rolls { turn = twist + p; }
-        pair.a.w -= spin_of(rules.isotropic, pair.mass_a, turn);
-        pair.b.w += spin_of(rules.isotropic, pair.mass_b, turn);
+        apply_angular_impulse(rules.isotropic, &pair, turn);
         if !rules.rolls { apply_impulse(rules.isotropic, &pair, points[end].r_a, points[end].r_b, p); }
     }
     store_pair(contact.body_a, contact.body_b, &pair);

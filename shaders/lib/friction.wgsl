@@ -45,23 +45,19 @@ fn solve_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, poi
 // Friction against the spin about the normal, limited by the sum of the normal impulses times their distances from the
 // middle.
 fn solve_twist(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_point: Point, lever: f32, impulse: ptr<function, Impulse>) {
-    var w = (*pair).b.w - (*pair).a.w;
-    if rules.from_start { w = w + ((*pair).start_b.w - (*pair).start_a.w); }
-    let spin = dot3(w, contact.normal);
+    let spin = dot3(relative_spin(rules, pair), contact.normal);
     let mass = params.relaxation * patch_point.normal_mass;
     let sum = clamp_abs((*impulse).normal - mass * spin, contact.friction * lever);
     let change = contact.normal * (sum - (*impulse).normal);
     (*impulse).normal = sum;
-    (*pair).a.w -= spin_of(rules.isotropic, (*pair).mass_a, change);
-    (*pair).b.w += spin_of(rules.isotropic, (*pair).mass_b, change);
+    apply_angular_impulse(rules.isotropic, pair, change);
 }
 
 // Friction against the relative spin of two bodies, at the patch of a manifold whose normal impulses add up to
 // `pressed`. `slip_1` of the patch is the lever of friction against spin about the normal, `slip_2` that against rolling.
 fn solve_rolling(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patch_point: Point, pressed: f32, impulse: ptr<function, Impulse>) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
-    var w = (*pair).b.w - (*pair).a.w;
-    if rules.from_start { w = w + ((*pair).start_b.w - (*pair).start_a.w); }
+    let w = relative_spin(rules, pair);
     let masses = params.relaxation * vec2f(patch_point.normal_mass, patch_point.tangent_mass);
     let spun = clamp_abs((*impulse).normal - masses.x * dot3(w, contact.normal), patch_point.slip_1 * pressed);
     let rolled = allowed_friction(
@@ -74,6 +70,5 @@ fn solve_rolling(rules: Rules, pair: ptr<function, Pair>, contact: Contact, patc
     (*impulse).normal = spun;
     (*impulse).tangent_1 = rolled.x;
     (*impulse).tangent_2 = rolled.y;
-    (*pair).a.w -= spin_of(rules.isotropic, (*pair).mass_a, turn);
-    (*pair).b.w += spin_of(rules.isotropic, (*pair).mass_b, turn);
+    apply_angular_impulse(rules.isotropic, pair, turn);
 }

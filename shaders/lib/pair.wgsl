@@ -16,6 +16,19 @@ fn apply_impulse(isotropic: bool, pair: ptr<function, Pair>, r_a: vec3f, r_b: ve
     (*pair).b.w += spin_of(isotropic, (*pair).mass_b, cross3(r_b, p));
 }
 
+// Applies the angular impulse u to b, and -u to a.
+fn apply_angular_impulse(isotropic: bool, pair: ptr<function, Pair>, u: vec3f) {
+    (*pair).a.w -= spin_of(isotropic, (*pair).mass_a, u);
+    (*pair).b.w += spin_of(isotropic, (*pair).mass_b, u);
+}
+
+// Angular velocity of b relative to a.
+fn relative_spin(rules: Rules, pair: ptr<function, Pair>) -> vec3f {
+    let w = (*pair).b.w - (*pair).a.w;
+    if rules.from_start { return w + ((*pair).start_b.w - (*pair).start_a.w); }
+    return w;
+}
+
 // Velocity of b at r_b relative to a at r_a.
 fn relative_velocity(rules: Rules, pair: ptr<function, Pair>, r_a: vec3f, r_b: vec3f) -> vec3f {
     let u = ((*pair).b.v + cross3((*pair).b.w, r_b)) - ((*pair).a.v + cross3((*pair).a.w, r_a));

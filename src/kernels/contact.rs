@@ -6,7 +6,7 @@
 
 use super::Rules;
 use super::friction::{solve_friction, solve_rolling, solve_twist};
-use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
+use super::pair::{apply_angular_impulse, apply_impulse, note_correction, relative_velocity, spin_of};
 use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
@@ -268,9 +268,7 @@ pub fn warm_start<L: Lane>(rules: Rules, pair: &mut Pair<L>, contact: &Contact<L
         let (patch, impulse) = (rows.point(end), rows.impulse(end));
         let twist = contact.normal * impulse.normal;
         let p = contact.tangent * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
-        let turn = if rules.rolls { twist + p } else { twist };
-        pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, turn);
-        pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, turn);
+        apply_angular_impulse(rules, pair, if rules.rolls { twist + p } else { twist });
         if !rules.rolls {
             apply_impulse(rules, pair, patch.r_a, patch.r_b, p);
         }

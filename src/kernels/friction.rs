@@ -1,7 +1,7 @@
 //! Friction at one point or over one manifold. Twins of `shaders/lib/friction.wgsl`.
 
 use super::Rules;
-use super::pair::{apply_impulse, note_correction, relative_velocity, spin_of};
+use super::pair::{apply_angular_impulse, apply_impulse, note_correction, relative_spin, relative_velocity};
 use super::rows::{Contact, Impulse, Pair, Point, StepParams};
 use crate::config::FrictionRule;
 use crate::math::{Lane, cross3, dot3, larger, smaller};
@@ -77,17 +77,12 @@ pub fn solve_twist<L: Lane>(
     lever: L,
     impulse: &mut Impulse<L>,
 ) {
-    let mut w = pair.b.w - pair.a.w;
-    if rules.from_start {
-        w += pair.start_b.w - pair.start_a.w;
-    }
-    let spin = dot3(w, contact.normal);
+    let spin = dot3(relative_spin(rules, pair), contact.normal);
     let mass = params.relaxation * patch.normal_mass;
     let sum = clamp_abs(impulse.normal - mass * spin, contact.friction * lever);
     let change = contact.normal * (sum - impulse.normal);
     impulse.normal = sum;
-    pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, change);
-    pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, change);
+    apply_angular_impulse(rules, pair, change);
 }
 
 /// Friction against the relative spin of two bodies, at the patch of a manifold whose normal impulses add up to
@@ -104,10 +99,7 @@ pub fn solve_rolling<L: Lane>(
     impulse: &mut Impulse<L>,
 ) {
     let tangent_2 = cross3(contact.normal, contact.tangent);
-    let mut w = pair.b.w - pair.a.w;
-    if rules.from_start {
-        w += pair.start_b.w - pair.start_a.w;
-    }
+    let w = relative_spin(rules, pair);
     let [about_normal, rolling] = [patch.normal_mass, patch.tangent_mass].map(|mass| params.relaxation * mass);
     let spun = clamp_abs(impulse.normal - about_normal * dot3(w, contact.normal), patch.slip_1 * pressed);
     let rolled =
@@ -116,6 +108,5 @@ pub fn solve_rolling<L: Lane>(
     let turn = contact.normal * (spun - impulse.normal)
         + (contact.tangent * (rolled[0] - impulse.tangent_1) + tangent_2 * (rolled[1] - impulse.tangent_2));
     (impulse.normal, impulse.tangent_1, impulse.tangent_2) = (spun, rolled[0], rolled[1]);
-    pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, turn);
-    pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, turn);
+    apply_angular_impulse(rules, pair, turn);
 }

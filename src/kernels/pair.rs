@@ -19,6 +19,20 @@ pub fn apply_impulse<L: Lane>(rules: Rules, pair: &mut Pair<L>, r_a: Vec3<L>, r_
     pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, cross3(r_b, p));
 }
 
+/// Applies the angular impulse u to b, and -u to a.
+#[inline(always)]
+pub fn apply_angular_impulse<L: Lane>(rules: Rules, pair: &mut Pair<L>, u: Vec3<L>) {
+    pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, u);
+    pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, u);
+}
+
+/// Angular velocity of b relative to a.
+#[inline(always)]
+pub fn relative_spin<L: Lane>(rules: Rules, pair: &Pair<L>) -> Vec3<L> {
+    let w = pair.b.w - pair.a.w;
+    if rules.from_start { w + (pair.start_b.w - pair.start_a.w) } else { w }
+}
+
 /// Velocity of b at r_b relative to a at r_a.
 #[inline(always)]
 pub fn relative_velocity<L: Lane>(rules: Rules, pair: &Pair<L>, r_a: Vec3<L>, r_b: Vec3<L>) -> Vec3<L> {
