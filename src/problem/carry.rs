@@ -29,6 +29,13 @@ pub struct Carry {
 
 crate::saved::cloned!(Carry { on_device, written, approach, surfaces, tangents, preload });
 
+impl Carry {
+    /// Whether the host sends all points in each step, since the device cannot compute them.
+    pub fn sends_points(&self) -> bool {
+        self.approach || self.surfaces
+    }
+}
+
 /// A contact whose rows were written again, 8 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]

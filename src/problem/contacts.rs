@@ -125,31 +125,27 @@ struct Materials {
 crate::saved::fields!(Materials { bounce, may_jam, rolls, driven, locked });
 
 impl Materials {
-    fn among(all: impl Iterator<Item = Material> + Clone) -> Self {
-        Self {
-            bounce: all.clone().any(|material| material.restitution > 0.0),
-            may_jam: all.clone().any(|material| material.friction > MIN_JAMMING),
-            rolls: all.clone().any(|material| material.rolls()),
-            driven: all.clone().any(|material| material.is_driven()),
-            locked: false,
-        }
+    fn of(world: &World) -> Self {
+        world.bodies.iter().fold(Self::default(), |all, body| {
+            let locked = all.locked || body.has_locked_translation();
+            body.materials().fold(Self { locked, ..all }, Self::with)
+        })
     }
 
-    fn of(world: &World) -> Self {
-        let locked = world.bodies.iter().any(Body::has_locked_translation);
-        Self { locked, ..Self::among(world.bodies.iter().flat_map(Body::materials)) }
+    /// The same facts with another material.
+    fn with(self, material: Material) -> Self {
+        Self {
+            bounce: self.bounce || material.restitution > 0.0,
+            may_jam: self.may_jam || material.friction > MIN_JAMMING,
+            rolls: self.rolls || material.rolls(),
+            driven: self.driven || material.is_driven(),
+            ..self
+        }
     }
 
     /// The same facts with the materials of hooks.
     fn and(self, hooked: &[Option<Material>]) -> Self {
-        let Self { bounce, may_jam, rolls, driven, .. } = Self::among(hooked.iter().flatten().copied());
-        Self {
-            bounce: self.bounce || bounce,
-            may_jam: self.may_jam || may_jam,
-            rolls: self.rolls || rolls,
-            driven: self.driven || driven,
-            locked: self.locked,
-        }
+        hooked.iter().flatten().copied().fold(self, Self::with)
     }
 }
 

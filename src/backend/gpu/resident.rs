@@ -118,7 +118,7 @@ pub(super) async fn begin(
         contact_count: swept.len() as u32,
         order: problem.colors.len() as u32,
         written_count: carry.written.len() as u32,
-        has_points: (carry.approach || carry.surfaces).into(),
+        has_points: carry.sends_points().into(),
         tangents: carry.tangents.into(),
         ..ResidentParams::default()
     };
@@ -134,7 +134,7 @@ pub(super) async fn begin(
         send_written(buffers, problem, carry)?;
         programs.push(Dispatch::over(Program::WriteContacts, carry.written.len()));
     }
-    if carry.approach || carry.surfaces {
+    if carry.sends_points() {
         buffers.send(Binding::Points, bytemuck::cast_slice(&problem.points))?;
     }
     let of_contact = |&row: &u32| {
