@@ -349,7 +349,7 @@ impl Energy {
             } else {
                 numbers[body] = numbers[root as usize];
             }
-            // What locks the axes of a body holds it.
+            // A lock of its axes holds a body from outside.
             accounts[numbers[body] as usize].is_held |= state == HELD || world.bodies[body].has_locked_axis();
         }
         self.are_known = joints.is_empty();

@@ -210,7 +210,7 @@ pub struct TransformInterpolation;
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Order(pub u64);
 
-/// What decides all of a body but its motion.
+/// The components that decide all of a body but its motion.
 #[derive(QueryData)]
 pub(crate) struct Settings {
     kind: &'static RigidBody,

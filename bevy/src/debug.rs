@@ -6,7 +6,7 @@ use bevy_math::{Isometry3d, Vec3};
 
 use crate::physics::Physics;
 
-/// What a line shows.
+/// The meaning of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DebugLine {
     /// An edge of a shape.

@@ -1,11 +1,11 @@
-//! What physics cannot do.
+//! Errors of physics.
 
 use std::fmt;
 
 use bevy_ecs::prelude::*;
 
-/// What a body, a joint or a step cannot do, for example because a component is NaN. A change that is refused leaves
-/// the body as it was; a new body or joint enters the world when it is in order. The text is also logged.
+/// An error of a body, a joint or a step, for example because a component is NaN. A refused change leaves the body as
+/// it was. A new body or joint enters the world when it is in order. The text is also logged.
 ///
 /// ```
 /// use bevy_app::{App, FixedMain};

@@ -236,7 +236,7 @@ impl Physics {
         self.simulation.world.body(self.handle(entity)?)
     }
 
-    /// What the last step reports: times, sweeps, sleeping bodies.
+    /// The report of the last step: times, sweeps, sleeping bodies.
     pub fn stats(&self) -> &StepStats {
         &self.stats
     }

@@ -44,8 +44,8 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Four belts around a square, each of which ends at the side of the next. `n` boxes and balls
-/// ride round on them at `speed` (m/s), between two smooth walls. Every third is a ball that resists rolling.
+/// Four belts around a square, each of which ends at the side of the next. `n` boxes and balls ride round on them at
+/// `speed` (m/s), between two smooth walls. Every third is a ball that resists rolling.
 pub(super) fn belts(n: usize, speed: f32) -> Scene {
     const BELTS: f32 = 3.0;
     const HALF_WIDTH: f32 = 0.5;
