@@ -44,6 +44,8 @@ fn begin_node(node: u32) {
     );
     joint_nodes[node].mass_a = pair.mass_a.inv_mass;
     joint_nodes[node].mass_b = pair.mass_b.inv_mass;
+    joint_nodes[node].locks_a = pair.mass_a.locks;
+    joint_nodes[node].locks_b = pair.mass_b.locks;
     joint_nodes[node].softness = NOT_FACTORED;
 }
 

@@ -9,9 +9,10 @@ fn solve_joint(rules: Rules, i: u32) {
     var pair = load_pair(joint.body_a, joint.body_b);
     solve_axes(rules, false, &pair, joint);
     let anchors = current_anchors(&pair, joint);
-    let x = joint_column(&pair, anchors, vec3f(1.0, 0.0, 0.0));
-    let y = joint_column(&pair, anchors, vec3f(0.0, 1.0, 0.0));
-    let z = joint_column(&pair, anchors, vec3f(0.0, 0.0, 1.0));
+    let m = inverse_masses(&pair);
+    let x = joint_column(&pair, anchors, vec3f(1.0, 0.0, 0.0), m.x);
+    let y = joint_column(&pair, anchors, vec3f(0.0, 1.0, 0.0), m.y);
+    let z = joint_column(&pair, anchors, vec3f(0.0, 0.0, 1.0), m.z);
 
     // The gap is closed softly, or not at all in a relax sweep.
     let before = joint_impulses[i].linear;

@@ -63,13 +63,21 @@ fn apply_axis_impulse(pair: ptr<function, Pair>, motion: AxisMotion, p: f32) {
     (*pair).a.w += inv_inertia_times((*pair).mass_a, motion.about_a) * p;
     (*pair).b.v -= motion.along * (p * (*pair).mass_b.inv_mass);
     (*pair).b.w -= inv_inertia_times((*pair).mass_b, motion.about_b) * p;
+    keep_locks(pair);
 }
 
-// The speed that a unit impulse along the axis gives.
+// The least movement of bodies with locked axes, relative to that of free ones: 2^-20.
+const MIN_MOVED: f32 = 9.5367431640625e-7;
+
+// The speed that a unit impulse along the axis gives. Bodies with locked axes move by MIN_MOVED of those without at
+// least.
 fn axis_inverse_mass(pair: ptr<function, Pair>, motion: AxisMotion) -> f32 {
     let turn_a = dot3(motion.about_a, inv_inertia_times((*pair).mass_a, motion.about_a));
     let turn_b = dot3(motion.about_b, inv_inertia_times((*pair).mass_b, motion.about_b));
-    return dot3(motion.along, motion.along) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + (turn_a + turn_b);
+    let along = motion.along;
+    let free = dot3(along, along) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + (turn_a + turn_b);
+    if !has_locks(pair) { return free; }
+    return larger(dot3(along, along * inverse_masses(pair)) + (turn_a + turn_b), free * MIN_MOVED);
 }
 
 // Rows that are no limits are more than this above their upper limit (m, rad).

@@ -12,10 +12,10 @@ fn turning_column(m: Mass, r: vec3f, e: vec3f) -> vec3f {
     return cross3(inv_inertia_times(m, cross3(r, e)), r);
 }
 
-// One column of the joint's block of G M^-1 G^T.
-fn joint_column(pair: ptr<function, Pair>, anchors: Anchors, e: vec3f) -> vec3f {
+// One column of the joint's block of G M^-1 G^T: that of the axis e, along which the bodies have this inverse mass.
+fn joint_column(pair: ptr<function, Pair>, anchors: Anchors, e: vec3f, inverse_mass: f32) -> vec3f {
     let turning = turning_column((*pair).mass_a, anchors.r_a, e) + turning_column((*pair).mass_b, anchors.r_b, e);
-    return e * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turning;
+    return e * inverse_mass + turning;
 }
 
 // 2^-19. Rounding changes the determinant of a block with a trace of 1 to 2 by 3e-7.

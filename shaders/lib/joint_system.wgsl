@@ -114,23 +114,37 @@ fn movement(shift: mat3x3f, inv_mass: f32, about: mat3x3f, turn: mat3x3f) -> mat
 // The sides that a joint shares with itself, in the bits of `shared_sides`.
 const OWN_SIDES: u32 = 9u;
 
+// The shift of a row of S under a column, for a body with these locked axes.
+fn shift_under(column: u32, row: u32, locks: f32) -> mat3x3f {
+    var along = joint_nodes[column].along;
+    if locks > 0.0 {
+        let free = unlocked(locks, vec3f(1.0));
+        along = mat3x3f(along[0] * free.x, along[1] * free.y, along[2] * free.z);
+    }
+    return product_with_transpose(joint_nodes[row].along, along);
+}
+
 // The block of S in the column of one node and the row of another node, or of the same.
 fn coupling(column: u32, row: u32, shared_sides: u32) -> mat3x3f {
-    let shift = product_with_transpose(joint_nodes[row].along, joint_nodes[column].along);
     let mass_a = joint_nodes[column].mass_a;
     let mass_b = joint_nodes[column].mass_b;
+    let shift_a = shift_under(column, row, joint_nodes[column].locks_a);
+    var shift_b = shift_a;
+    if joint_nodes[column].locks_b != joint_nodes[column].locks_a {
+        shift_b = shift_under(column, row, joint_nodes[column].locks_b);
+    }
     var block = mat3x3f(vec3f(0.0), vec3f(0.0), vec3f(0.0));
     if (shared_sides & 1u) != 0u {
-        block = block_sum(block, movement(shift, mass_a, joint_nodes[row].about_a, joint_nodes[column].turn_a));
+        block = block_sum(block, movement(shift_a, mass_a, joint_nodes[row].about_a, joint_nodes[column].turn_a));
     }
     if (shared_sides & 2u) != 0u {
-        block = block_less(block, movement(shift, mass_a, joint_nodes[row].about_b, joint_nodes[column].turn_a));
+        block = block_less(block, movement(shift_a, mass_a, joint_nodes[row].about_b, joint_nodes[column].turn_a));
     }
     if (shared_sides & 4u) != 0u {
-        block = block_less(block, movement(shift, mass_b, joint_nodes[row].about_a, joint_nodes[column].turn_b));
+        block = block_less(block, movement(shift_b, mass_b, joint_nodes[row].about_a, joint_nodes[column].turn_b));
     }
     if (shared_sides & 8u) != 0u {
-        block = block_sum(block, movement(shift, mass_b, joint_nodes[row].about_b, joint_nodes[column].turn_b));
+        block = block_sum(block, movement(shift_b, mass_b, joint_nodes[row].about_b, joint_nodes[column].turn_b));
     }
     return block;
 }

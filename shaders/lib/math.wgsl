@@ -99,3 +99,12 @@ fn cofactors(column_x: vec3f, column_y: vec3f, column_z: vec3f, stiffening: f32)
     let c_x = cross3(y, z);
     return Cofactors(c_x, cross3(z, x), cross3(x, y), dot3(x, c_x), scale);
 }
+
+// A vector without its components along the axes of `locks`: the sum of 1 for x, 2 for y and 4 for z.
+fn unlocked(locks: f32, v: vec3f) -> vec3f {
+    let z = locks > 3.5;
+    let rest = locks - select(0.0, 4.0, z);
+    let y = rest > 1.5;
+    let x = rest - select(0.0, 2.0, y) > 0.5;
+    return vec3f(select(v.x, 0.0, x), select(v.y, 0.0, y), select(v.z, 0.0, z));
+}

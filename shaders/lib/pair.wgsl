@@ -16,6 +16,25 @@ fn apply_impulse(isotropic: bool, pair: ptr<function, Pair>, r_a: vec3f, r_b: ve
     (*pair).b.w += spin_of(isotropic, (*pair).mass_b, cross3(r_b, p));
 }
 
+// Whether a body of the pair has locked axes.
+fn has_locks(pair: ptr<function, Pair>) -> bool { return (*pair).mass_a.locks + (*pair).mass_b.locks > 0.0; }
+
+// The sum of the inverse masses of the two bodies along each axis of the world.
+fn inverse_masses(pair: ptr<function, Pair>) -> vec3f {
+    let a = (*pair).mass_a;
+    let b = (*pair).mass_b;
+    if !has_locks(pair) { return vec3f(a.inv_mass + b.inv_mass); }
+    return unlocked(a.locks, vec3f(a.inv_mass)) + unlocked(b.locks, vec3f(b.inv_mass));
+}
+
+// Removes velocities along locked axes, which an impulse gave.
+fn keep_locks(pair: ptr<function, Pair>) {
+    if has_locks(pair) {
+        (*pair).a.v = unlocked((*pair).mass_a.locks, (*pair).a.v);
+        (*pair).b.v = unlocked((*pair).mass_b.locks, (*pair).b.v);
+    }
+}
+
 // Applies the angular impulse u to b, and -u to a.
 fn apply_angular_impulse(isotropic: bool, pair: ptr<function, Pair>, u: vec3f) {
     (*pair).a.w -= spin_of(isotropic, (*pair).mass_a, u);
@@ -51,23 +70,14 @@ fn load_pair(a: u32, b: u32) -> Pair {
     return Pair(bodies[a], bodies[b], masses[a], masses[b], load_start(masses[a], a), load_start(masses[b], b));
 }
 
-// A vector without its components along locked axes.
-fn unlocked(m: Mass, v: vec3f) -> vec3f {
-    let z = m.locks > 3.5;
-    let rest = m.locks - select(0.0, 4.0, z);
-    let y = rest > 1.5;
-    let x = rest - select(0.0, 2.0, y) > 0.5;
-    return vec3f(select(v.x, 0.0, x), select(v.y, 0.0, y), select(v.z, 0.0, z));
-}
-
 // An immovable body is never written, because no color protects it. One with locked axes does not move along them.
 fn store_pair(a: u32, b: u32, pair: ptr<function, Pair>) {
     if (*pair).mass_a.inv_mass > 0.0 {
-        bodies[a].v = unlocked((*pair).mass_a, (*pair).a.v);
+        bodies[a].v = unlocked((*pair).mass_a.locks, (*pair).a.v);
         bodies[a].w = (*pair).a.w;
     }
     if (*pair).mass_b.inv_mass > 0.0 {
-        bodies[b].v = unlocked((*pair).mass_b, (*pair).b.v);
+        bodies[b].v = unlocked((*pair).mass_b.locks, (*pair).b.v);
         bodies[b].w = (*pair).b.w;
     }
 }

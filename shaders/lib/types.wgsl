@@ -47,7 +47,7 @@ struct JointNode {
     about_a: mat3x3f, about_b: mat3x3f,
     turn_a: mat3x3f, turn_b: mat3x3f,
     right: vec3f, softness: f32,
-    mass_a: f32, mass_b: f32,
+    mass_a: f32, mass_b: f32, locks_a: f32, locks_b: f32,
 }
 
 // A block of L, or the factors of a pivot, and the block of L D.

@@ -1,7 +1,7 @@
 //! One axis of a joint, along which or about which body a is held, limited or driven. Twins of `shaders/lib/axes.wgsl`.
 
 use super::Rules;
-use super::pair::{note_correction, relative_movement};
+use super::pair::{has_locks, inverse_masses, keep_locks, note_correction, relative_movement};
 use super::rows::{Axis, Joint, Pair, StepParams};
 use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, smaller, turned, vec3};
 
@@ -89,14 +89,27 @@ fn apply_axis_impulse<L: Lane>(pair: &mut Pair<L>, motion: &AxisMotion<L>, p: L)
     pair.a.w += pair.mass_a.inv_inertia.times(motion.about_a) * p;
     pair.b.v -= motion.along * (p * pair.mass_b.inv_mass);
     pair.b.w -= pair.mass_b.inv_inertia.times(motion.about_b) * p;
+    keep_locks(pair);
 }
 
-/// The speed that a unit impulse along the axis gives.
+/// The least movement of bodies with locked axes, relative to that of free ones: 2^-20.
+const MIN_MOVED: f64 = 9.536_743_164_062_5e-7;
+
+/// The speed that a unit impulse along the axis gives. Bodies with locked axes move by [`MIN_MOVED`] of those without
+/// at least.
 #[inline(always)]
 pub fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
     let turn_a = dot3(motion.about_a, pair.mass_a.inv_inertia.times(motion.about_a));
     let turn_b = dot3(motion.about_b, pair.mass_b.inv_inertia.times(motion.about_b));
-    dot3(motion.along, motion.along) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + (turn_a + turn_b)
+    let along = motion.along;
+    let free = dot3(along, along) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + (turn_a + turn_b);
+    if !L::any(has_locks(pair)) {
+        return free;
+    }
+    let m = inverse_masses(pair);
+    let moved = dot3(along, vec3(along.x * m.x, along.y * m.y, along.z * m.z));
+    let least = free * L::constant(MIN_MOVED);
+    L::select(free, larger(moved + (turn_a + turn_b), least), has_locks(pair))
 }
 
 /// Applies the carried impulse of an axis. Kernel `warm_start_joints`.

@@ -3,7 +3,7 @@
 
 use super::Rules;
 use super::axis::select3;
-use super::pair::{apply_impulse, note_correction, relative_movement, relative_velocity};
+use super::pair::{apply_impulse, inverse_masses, note_correction, relative_movement, relative_velocity};
 use super::rows::{Joint, Mass, Pair, StepParams};
 use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, turned, vec3};
 
@@ -19,11 +19,11 @@ fn turning_column<L: Lane>(m: &Mass<L>, r: Vec3<L>, e: Vec3<L>) -> Vec3<L> {
     cross3(m.inv_inertia.times(cross3(r, e)), r)
 }
 
-/// One column of the joint's block of G M⁻¹ Gᵀ.
+/// One column of the joint's block of G M⁻¹ Gᵀ: that of the axis e, along which the bodies have this inverse mass.
 #[inline(always)]
-pub fn joint_column<L: Lane>(pair: &Pair<L>, anchors: [Vec3<L>; 2], e: Vec3<L>) -> Vec3<L> {
+pub fn joint_column<L: Lane>(pair: &Pair<L>, anchors: [Vec3<L>; 2], e: Vec3<L>, inverse_mass: L) -> Vec3<L> {
     let turning = turning_column(&pair.mass_a, anchors[0], e) + turning_column(&pair.mass_b, anchors[1], e);
-    e * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning
+    e * inverse_mass + turning
 }
 
 /// The parts of the inverse of a symmetric block. Twin of the WGSL struct `Cofactors`.
@@ -81,9 +81,10 @@ pub fn solve_joint<L: Lane>(
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let anchors = current_anchors(pair, joint);
-    let x = joint_column(pair, anchors, vec3(one, zero, zero));
-    let y = joint_column(pair, anchors, vec3(zero, one, zero));
-    let z = joint_column(pair, anchors, vec3(zero, zero, one));
+    let m = inverse_masses(pair);
+    let x = joint_column(pair, anchors, vec3(one, zero, zero), m.x);
+    let y = joint_column(pair, anchors, vec3(zero, one, zero), m.y);
+    let z = joint_column(pair, anchors, vec3(zero, zero, one), m.z);
 
     // The gap is closed softly, or not at all in a relax sweep.
     let before = *impulse;

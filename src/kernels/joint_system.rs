@@ -15,6 +15,7 @@ use super::joint::current_anchors;
 use super::pair::{relative_movement, relative_velocity};
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, turned, vec3};
+use crate::problem::arithmetic::unlocked;
 use crate::problem::{JointSystems, NodeRow};
 
 /// A block of a matrix, as three columns. Each column has a fourth number, which nothing reads, so that a column of
@@ -122,6 +123,13 @@ impl<L: Lane> Block<L> {
             over.0[2][i] = z[i] - x[i] * l_x[2] - over.0[1][i] * l_y[2];
         }
         over
+    }
+
+    /// The block without its columns of locked axes.
+    #[inline(always)]
+    pub fn unlocked(&self, locks: L) -> Self {
+        let one = L::constant(1.0);
+        self.with_columns_times(unlocked(locks, vec3(one, one, one)))
     }
 
     /// The block with its columns scaled by three numbers.
@@ -239,6 +247,8 @@ pub struct JointNode<L> {
     pub turns: [Block<L>; 2],
     /// Inverse masses of a and b.
     pub inv_masses: [L; 2],
+    /// Locked axes of a and b.
+    pub locks: [L; 2],
     /// The velocity by which a row yields to a unit impulse; 0 for a rigid joint, `NOT_FACTORED` before it is known.
     pub softness: L,
     /// The right-hand side, then the correction.
@@ -258,6 +268,7 @@ impl<L: Lane> JointNode<L> {
                 Block::of(b.times(x.about_b), b.times(y.about_b), b.times(z.about_b)),
             ],
             inv_masses: [pair.mass_a.inv_mass, pair.mass_b.inv_mass],
+            locks: [pair.mass_a.locks, pair.mass_b.locks],
             softness: L::constant(NOT_FACTORED),
             right: Vec3::default(),
         }
@@ -289,6 +300,11 @@ impl<L: Lane> JointNode<L> {
         for side in 0..4 {
             if shared & (1 << side) != 0 {
                 let (i, j) = (side / 2, side % 2);
+                let shift = if L::any(self.locks[i].gt(L::constant(0.0))) {
+                    row.along.product_with_transpose(&self.along.unlocked(self.locks[i]))
+                } else {
+                    shift
+                };
                 let movement = row.about[j].product(&self.turns[i]).plus(&shift.scaled(self.inv_masses[i]));
                 block = if i == j { block.plus(&movement) } else { block.less(&movement) };
             }

@@ -2,7 +2,7 @@
 
 use super::Rules;
 use super::rows::{Pair, StepParams, Sym3};
-use crate::math::{Lane, Vec3, cross3, larger, turned};
+use crate::math::{Lane, Vec3, cross3, larger, turned, vec3};
 
 /// The change of a body's spin by an impulse with the moment u: its inverse inertia times u.
 #[inline(always)]
@@ -17,6 +17,32 @@ pub fn apply_impulse<L: Lane>(rules: Rules, pair: &mut Pair<L>, r_a: Vec3<L>, r_
     pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, cross3(r_a, p));
     pair.b.v += p * pair.mass_b.inv_mass;
     pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, cross3(r_b, p));
+}
+
+/// Which pairs have a body with locked axes.
+#[inline(always)]
+pub fn has_locks<L: Lane>(pair: &Pair<L>) -> L::Mask {
+    (pair.mass_a.locks + pair.mass_b.locks).gt(L::constant(0.0))
+}
+
+/// The sum of the inverse masses of the two bodies along each axis of the world.
+#[inline(always)]
+pub fn inverse_masses<L: Lane>(pair: &Pair<L>) -> Vec3<L> {
+    let all = |m: L| vec3(m, m, m);
+    let (a, b) = (pair.mass_a.inv_mass, pair.mass_b.inv_mass);
+    if !L::any(has_locks(pair)) {
+        return all(a + b);
+    }
+    pair.mass_a.unlocked(all(a)) + pair.mass_b.unlocked(all(b))
+}
+
+/// Removes velocities along locked axes, which an impulse gave.
+#[inline(always)]
+pub fn keep_locks<L: Lane>(pair: &mut Pair<L>) {
+    if L::any(has_locks(pair)) {
+        pair.a.v = pair.mass_a.unlocked(pair.a.v);
+        pair.b.v = pair.mass_b.unlocked(pair.b.v);
+    }
 }
 
 /// Applies the angular impulse u to b, and -u to a.

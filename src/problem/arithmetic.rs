@@ -38,13 +38,19 @@ impl<L: Lane> Mass<L> {
     /// A vector without its components along locked axes. Twin of the WGSL function of this name.
     #[inline(always)]
     pub fn unlocked(&self, v: Vec3<L>) -> Vec3<L> {
-        let zero = L::constant(0.0);
-        let z = self.locks.gt(L::constant(3.5));
-        let rest = self.locks - L::select(zero, L::constant(4.0), z);
-        let y = rest.gt(L::constant(1.5));
-        let x = (rest - L::select(zero, L::constant(2.0), y)).gt(L::constant(0.5));
-        vec3(L::select(v.x, zero, x), L::select(v.y, zero, y), L::select(v.z, zero, z))
+        unlocked(self.locks, v)
     }
+}
+
+/// A vector without its components along the axes of `locks`.
+#[inline(always)]
+pub fn unlocked<L: Lane>(locks: L, v: Vec3<L>) -> Vec3<L> {
+    let zero = L::constant(0.0);
+    let z = locks.gt(L::constant(3.5));
+    let rest = locks - L::select(zero, L::constant(4.0), z);
+    let y = rest.gt(L::constant(1.5));
+    let x = (rest - L::select(zero, L::constant(2.0), y)).gt(L::constant(0.5));
+    vec3(L::select(v.x, zero, x), L::select(v.y, zero, y), L::select(v.z, zero, z))
 }
 
 /// No solid of even density jams with friction up to this. A point at the distance r from the center of such a solid

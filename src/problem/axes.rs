@@ -199,7 +199,7 @@ fn inverse_mass_along(joint: &JointRow, axis: &AxisRow, masses: &[MassRow]) -> f
     let of = |body: u32, arm: [f32; 3]| {
         let inverse = InverseMass::of(&masses[body as usize]);
         let about = if is_linear { Vec3::from_array(arm).cross(direction) } else { direction };
-        (if is_linear { inverse.mass } else { 0.0 }) + about.dot(inverse.inertia * about)
+        (if is_linear { inverse.along(direction) } else { 0.0 }) + about.dot(inverse.inertia * about)
     };
     of(joint.body_a, joint.r_a) + of(joint.body_b, joint.r_b)
 }

@@ -32,6 +32,15 @@ impl InverseMass {
         }
     }
 
+    /// Inverse mass along a unit vector, which locked axes reduce.
+    pub fn along(&self, direction: Vec3) -> f32 {
+        if self.locks == 0.0 {
+            return self.mass;
+        }
+        let moved = self.lane().unlocked(math::Vec3::load(direction.to_array()));
+        self.mass * math::dot3(moved, moved)
+    }
+
     /// The same in the form of the kernels.
     fn lane(&self) -> Mass<f32> {
         let Mat3 { x_axis: x, y_axis: y, z_axis: z } = self.inertia;

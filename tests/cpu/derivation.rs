@@ -200,8 +200,9 @@ fn the_block_of_a_joint_is_the_dense_product() {
     let case = case();
     let pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
     let anchors = case.r.map(lane);
+    let inverse_mass = pair.mass_a.inv_mass + pair.mass_b.inv_mass;
     for e in [DVec3::X, DVec3::Y, DVec3::Z] {
-        let column = joint_column(&pair, anchors, lane(e));
+        let column = joint_column(&pair, anchors, lane(e), inverse_mass);
         for (d, entry) in [(DVec3::X, column.x), (DVec3::Y, column.y), (DVec3::Z, column.z)] {
             assert!((entry - case.dense(d, e)).abs() < 1e-14);
         }
