@@ -19,7 +19,7 @@ use crate::error::{Result, ensure};
 use crate::graph::Islands;
 use crate::math::rotation::{product, unit};
 use crate::problem::damping::Decay;
-use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem};
+use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem, pose_after};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
 
@@ -27,6 +27,10 @@ use crate::world::{Body, World};
 /// energy, plus the second share of the weight of its bodies times their size.
 const REGAINED: f64 = 1e-3;
 const ROUNDING: f64 = 1e-6;
+/// The distance between the highest and the lowest place that rounding gives a jointed body, relative to its distance
+/// from the origin plus its lever: the position, the rotation, the arm and their sum each round by up to half of
+/// `EPSILON`, up or down.
+const LAST_BITS: f64 = 4.0 * f32::EPSILON as f64;
 /// Largest number of substeps in a step for which rounding of velocities adds up. Shorter substeps sum changes, which
 /// round less.
 const MAX_ROUNDINGS: f64 = 16.0;
@@ -168,7 +172,8 @@ impl Entry {
 #[derive(Clone, Copy, Debug, Default)]
 struct Account {
     all: Entry,
-    mass: f64,
+    /// The sum of the largest reserves of its bodies.
+    slack: f64,
     /// The common motion of its bodies, if nothing outside holds them.
     common: Common,
     /// Energy that the springs of its contacts gave back, and energy that they held at the start of the step (J).
@@ -177,7 +182,7 @@ struct Account {
     /// Whether anything outside the island holds it.
     is_held: bool,
     is_refused: bool,
-    /// The share of spring energy that its bodies keep, and their reserve per mass (J/kg).
+    /// The share of spring energy that its bodies keep, and the share of their largest reserves that they have.
     shares: [f64; 2],
 }
 
@@ -265,6 +270,8 @@ impl Energy {
         springs::add_springs(&mut self.entries, problem, world, substep);
         self.add_contacts_of_jointed(problem, effort);
         self.fresh.sort_unstable();
+        // The first rounding of a position may be a gain.
+        self.fresh.iter().for_each(|&i| self.entries[i].reserve = self.entries[i].reserve.max(self.entries[i].rest));
         springs::add_springs_at_start(&mut self.entries, problem, world, config, &self.fresh, substep);
         self.fresh.clear();
         springs::add_work_of_drives(&mut self.entries, problem, world, substep);
@@ -283,16 +290,16 @@ impl Energy {
         }
         let share = |of: f32, sum: f64| if sum > 0.0 { f64::from(of) / sum } else { 0.0 };
         for account in &mut self.accounts {
-            let Account { all, mass, released, .. } = account;
+            let Account { all, slack, released, .. } = account;
             let Kept { springs, reserve, .. } = Kept::of(all, all.left() + *released);
-            account.shares = [share(springs, all.springs), share(reserve, *mass)];
+            account.shares = [share(springs, all.springs), share(reserve, *slack)];
         }
         for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
             let [springs, reserve] =
                 self.accounts.get(number as usize).map(|account| account.shares).unwrap_or_default();
             // An exploded step can leave springs at NaN.
             kept.springs = if springs > 0.0 { (springs * self.entries[i].springs) as f32 } else { 0.0 };
-            kept.reserve = (reserve * f64::from(world.bodies[i].mass.mass)) as f32;
+            kept.reserve = (reserve * self.entries[i].slack) as f32;
         }
         taken
     }
@@ -365,7 +372,7 @@ impl Energy {
         for (i, &number) in members() {
             let account = &mut accounts[number as usize];
             account.all.add(&entries[i]);
-            account.mass += f64::from(world.bodies[i].mass.mass);
+            account.slack += entries[i].slack;
         }
         if accounts.iter().all(|account| account.is_held) {
             return;
@@ -377,7 +384,7 @@ impl Energy {
                 account.common.add(&common(&world.bodies[i], i, problem, substep));
             }
         }
-        let free = accounts.iter_mut().filter(|account| !account.is_held && account.mass > 0.0);
+        let free = accounts.iter_mut().filter(|account| !account.is_held && account.common.mass > 0.0);
         free.for_each(|account| account.all.leave_out(account.common));
     }
 
@@ -521,7 +528,7 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let m = f64::from(body.mass.mass);
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
     let acceleration = Vec3::from(mass.acceleration);
-    let pushed = m * acceleration.as_dvec3().dot(way(row, v, v_0, substep));
+    let pushed = m * acceleration.as_dvec3().dot(way(body, row, v, v_0, substep));
     let torque = body.whole_torque();
     let w = Vec3::from(row.w);
     let turned = if torque == Vec3::ZERO { 0.0 } else { f64::from(torque.dot(w + body.angular_velocity)) * (0.5 * dt) };
@@ -537,7 +544,8 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let after = 0.5 * m * v.length_squared() + spinning(&|| product(turn_of(row), body.rotation), w);
     // The radius of gyration is a measure of size.
     let size = f64::from(body.mass.principal_inertia.min_element() / body.mass.mass).sqrt();
-    let rest = ROUNDING * m * f64::from(acceleration.length()) * size;
+    let last_bits = LAST_BITS * f64::from(body.center_of_mass().length());
+    let rest = m * f64::from(acceleration.length()) * (ROUNDING * size + last_bits);
     let slack = REGAINED * after + rest;
     // Gravity causes the same rounding of a velocity in each substep. Short substeps sum changes, which round less.
     // Energy that constraints added does not count.
@@ -546,9 +554,12 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
 }
 
 /// Displacement of a body between the times of its velocities, which belong to the middle of a substep (m): at the last
-/// of them the body has moved half a substep further, but not at the first.
-fn way(row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
-    Vec3::from(row.dp).as_dvec3() - (v - v_0) * (0.5 * substep)
+/// of them the body has moved half a substep further, but not at the first. It is the displacement between the stored
+/// positions, so that the work of a constant force over many steps has no rounding that adds up.
+fn way(body: &Body, row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
+    let (position, rotation) = pose_after(body, row);
+    let center = position + rotation * body.mass.center;
+    center.as_dvec3() - body.center_of_mass().as_dvec3() - (v - v_0) * (0.5 * substep)
 }
 
 /// The part of a body in the common motion of its island.
@@ -556,7 +567,7 @@ fn common(body: &Body, i: usize, problem: &StepProblem, substep: f64) -> Common 
     let (row, mass) = (&problem.bodies[i], f64::from(body.mass.mass));
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
     let force = mass * Vec3::from(problem.masses[i].acceleration).as_dvec3();
-    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(row, v, v_0, substep) }
+    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(body, row, v, v_0, substep) }
 }
 
 /// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of them

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::{Entry, can_move, ends, moved_by};
+use super::{Entry, LAST_BITS, can_move, ends, moved_by};
 use crate::config::SolverConfig;
 use crate::kernels::Rules;
 use crate::kernels::axis::{axis_inverse_mass, axis_motion, axis_speed};
@@ -20,6 +20,14 @@ pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &
         let lever =
             [joint.r_a, joint.r_b].map(|arm| f64::from(Vec3::from(arm).length())).into_iter().fold(0.0, f64::max);
         entries[body as usize].lever = entries[body as usize].lever.max(lever);
+        for (end, arm) in ends(joint).into_iter().zip([joint.r_a, joint.r_b]).filter(|(end, _)| can_move(problem, *end))
+        {
+            let mass = &problem.masses[end as usize];
+            let weight = f64::from(Vec3::from(mass.acceleration).length() / mass.inv_mass);
+            let rest = weight * LAST_BITS * f64::from(Vec3::from(arm).length());
+            let entry = &mut entries[end as usize];
+            (entry.rest, entry.slack) = (entry.rest + rest, entry.slack + rest);
+        }
         let (of_joint, pair) = (Joint::<f64>::load(joint), pair_of(problem, joint));
         let mut energy = 0.0;
         if joint.is_loose == 0.0 {

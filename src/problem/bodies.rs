@@ -96,6 +96,14 @@ pub(super) fn mass_row(body: &Body) -> MassRow {
     }
 }
 
+/// The position and the rotation of a body after the step that its row has made.
+pub(crate) fn pose_after(body: &Body, row: &BodyRow) -> (Vec3, Quat) {
+    let center = body.center_of_mass() + Vec3::from_array(row.dp);
+    let rotation =
+        if body.has_fixed_rotation() { body.rotation } else { unit(product(Quat::from_array(row.dq), body.rotation)) };
+    (center - rotation * body.mass.center, rotation)
+}
+
 /// Writes poses and velocities into the world, except for bodies that are asleep. Impulses stay in their rows for the
 /// next step.
 pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
@@ -105,11 +113,7 @@ pub fn store(problem: &StepProblem, asleep: &[bool], world: &mut World) {
             return;
         }
         body.forget_applied_forces();
-        let center = body.center_of_mass() + Vec3::from_array(row.dp);
-        if !body.has_fixed_rotation() {
-            body.rotation = unit(product(Quat::from_array(row.dq), body.rotation));
-        }
-        body.position = center - body.rotation * body.mass.center;
+        (body.position, body.rotation) = pose_after(body, row);
         body.linear_velocity = body.allowed_velocity(Vec3::from_array(row.v));
         body.angular_velocity = body.allowed_spin(Vec3::from_array(row.w));
     });

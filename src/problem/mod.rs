@@ -28,6 +28,7 @@ mod write;
 pub use arithmetic::{Mass, Sym3};
 pub(crate) use axes::drive_count;
 pub use blocks::{Block, lay_out};
+pub(crate) use bodies::pose_after;
 pub use bodies::{begin, store};
 pub use contacts::{ContactRows, check_material};
 pub use damping::write_dampings;
