@@ -52,7 +52,8 @@ struct JointNode {
     softness: f32,
     mass_a: f32,
     mass_b: f32,
-    pad: [f32; 2],
+    locks_a: f32,
+    locks_b: f32,
 }
 #[repr(C)]
 struct JointBlock {
@@ -81,7 +82,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
             direction is_linear gap left speed max_impulse rate mass_scale impulse_scale length
         }
         JointImpulse = JointImpulseRow { linear }
-        JointNode = JointNode { along about_a about_b turn_a turn_b right softness mass_a mass_b }
+        JointNode = JointNode { along about_a about_b turn_a turn_b right softness mass_a mass_b locks_a locks_b }
         JointBlock = JointBlock { lower upper }
         Turning = TurningRow { inv_inertia_x body inv_inertia_yz }
         Convergence = ConvergenceRow { moving done sweeps planned }
