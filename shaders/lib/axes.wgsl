@@ -127,7 +127,11 @@ fn solve_axis(rules: Rules, but_locks: bool, pair: ptr<function, Pair>, joint: J
 
     let before = joint_impulses[k].linear.x * sign;
     let wanted = (axis_speed(rules, pair, motion) - axis.speed) * sign;
-    let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
+    // The impulse of a spring by its gap does not depend on the mass that it moves at present.
+    let is_spring = axis.impulse_scale > 0.0;
+    let push = select(0.0, axis.rate, rules.biased);
+    let of_gap = select(wanted * mass_scale + gap * rate, wanted * mass_scale, is_spring);
+    let correction = select(mass * of_gap, mass * of_gap + gap * push, is_spring) + before * impulse_scale;
     let least = select(-axis.max_impulse, 0.0, limit.is_limit);
     var sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
     if but_locks { sum = select(sum, before, is_lock(axis)); }

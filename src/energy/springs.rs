@@ -9,7 +9,7 @@ use crate::kernels::axis::{axis_inverse_mass, axis_motion, axis_speed};
 use crate::kernels::pair::relative_movement;
 use crate::kernels::rows::{Axis, Body as BodyOf, Joint, Mass, Pair};
 use crate::math::dot3;
-use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count};
+use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count, stiffness};
 use crate::world::{Body, BodyKind, World};
 
 /// Adds the energy that the springs of joints hold now, half of force times gap each, and records the levers of joints.
@@ -122,16 +122,17 @@ pub(super) fn add_work_of_drives(
         }
         let (of_joint, end) = (Joint::<f64>::load(joint), pair_of(problem, joint));
         let start = pair_at_start(&end, world, joint);
-        for k in axes_of(joint).take(drives) {
+        for (number, k) in axes_of(joint).take(drives).enumerate() {
             let axis = Axis::<f64>::load(&problem.axes[k]);
             let motions = [&start, &end].map(|pair| (pair, axis_motion(pair, &of_joint, &axis)));
             let speeds = motions.each_ref().map(|(pair, motion)| axis_speed(Rules::default(), pair, motion));
             if axis.impulse_scale > 0.0 {
-                let masses = motions.each_ref().map(|(pair, motion)| axis_inverse_mass(pair, motion).recip());
                 let h = substep(body as usize);
                 // Positions at the times of the velocities.
                 let places = [0, 1].map(|i| axis.gap + motions[i].1.moved - 0.5 * h * speeds[i]);
-                work += given_by_drive(&axis, places, masses, h);
+                let stiffness = f64::from(stiffness(of_world, number, world));
+                let [before, after] = places.map(|place| held_by_drive(stiffness, axis.max_impulse / h, place));
+                work += before - after;
             } else {
                 let impulse = axis_impulse(problem, k, &problem.joint_totals);
                 work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);
@@ -141,18 +142,10 @@ pub(super) fn add_work_of_drives(
     }
 }
 
-/// The energy that a spring of the caller gives back between two deflections (J). `masses` are those that its axis moves
-/// there. The stiffness k follows the mass: if both it and the deflection x change steadily, the work differs from
-/// that of the mean stiffness by Δk Δx²/12, and if they do not, by at most Δk Δ(x²)/4 more.
-fn given_by_drive(axis: &Axis<f64>, deflections: [f64; 2], masses: [f64; 2], substep: f64) -> f64 {
-    let most = axis.max_impulse / substep;
-    let stiffness = masses.map(|mass| mass * axis.rate / (axis.impulse_scale * substep));
-    let mean = 0.5 * (stiffness[0] + stiffness[1]);
-    let free = deflections.map(|deflection| deflection.abs().min(most / mean));
-    let held = [0, 1].map(|i| mean * free[i] * (deflections[i].abs() - 0.5 * free[i]));
-    let [squares, moved] =
-        [free[1].powi(2) - free[0].powi(2), (deflections[1] - deflections[0]).abs().min(most / mean)];
-    held[0] - held[1] + (stiffness[1] - stiffness[0]).abs() * (0.25 * squares.abs() + moved * moved / 12.0)
+/// The energy in a spring of the caller with this stiffness and this largest load, at a deflection (J).
+fn held_by_drive(stiffness: f64, most: f64, deflection: f64) -> f64 {
+    let free = deflection.abs().min(most / stiffness);
+    stiffness * free * (deflection.abs() - 0.5 * free)
 }
 
 fn axes_of(joint: &JointRow) -> std::ops::Range<usize> {

@@ -191,7 +191,11 @@ pub fn solve_axis<L: Lane>(
 
     let before = *impulse * sign;
     let wanted = (axis_speed(rules, pair, &motion) - axis.speed) * sign;
-    let correction = mass * (wanted * mass_scale + gap * rate) + before * impulse_scale;
+    // The impulse of a spring by its gap does not depend on the mass that it moves at present.
+    let is_spring = axis.impulse_scale.gt(zero);
+    let push = if rules.biased { axis.rate } else { zero };
+    let of_gap = L::select(wanted * mass_scale + gap * rate, wanted * mass_scale, is_spring);
+    let correction = L::select(mass * of_gap, mass * of_gap + gap * push, is_spring) + before * impulse_scale;
     let least = L::select(-axis.max_impulse, zero, is_limit);
     let mut sum = smaller(larger(before - params.relaxation * correction, least), axis.max_impulse);
     if but_locks {

@@ -9,12 +9,12 @@
 //!
 //! has this determinant to the third order in a. Under a constant force f the spring comes to rest at x = f/(m w²), for
 //! any masses behind it. Its period is too long by the share a/2. A spring without damper keeps its energy. A row holds
-//! the share 1 - s of the speed that the spring takes away, the share s of the impulse that it gives back, and r
+//! the share 1 - s of the speed that the spring takes away, the share s of the impulse that it gives back, and m r
 //! (docs/derivation.md).
 
 use std::f32::consts::{PI, TAU};
 
-use glam::Vec3;
+use glam::{Mat3, Quat, Vec3};
 
 use super::effective::InverseMass;
 use super::rows::{AxisRow, JointRow, MassRow, NO_LIMIT};
@@ -52,29 +52,18 @@ pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
     if axes_of(joint).all(|(_, axis)| axis.drive == Drive::None) {
         return 0.0;
     }
-    let (a, b) = joint.indices();
-    let dynamic = [Some(a), b].into_iter().flatten().map(|body| &world.bodies[body]);
-    let (mass, inertia) = dynamic
-        .filter(|body| body.kind == BodyKind::Dynamic)
-        .map(|body| &body.mass)
-        .fold((f32::INFINITY, f32::INFINITY), |(mass, inertia), of| {
-            (of.mass.min(mass), of.principal_inertia.max_element().min(inertia))
-        });
+    let a = joint.body_a.index();
     let position = world.joint_motion(joint).position;
     let load = |(i, axis): (usize, &Axis)| {
-        let is_angle = i >= 3;
         let load = match axis.drive {
             Drive::None => 0.0,
             Drive::Motor { max_load, .. } => max_load,
-            Drive::Spring { target, frequency, max_load, .. } => {
-                let stiffness = if is_angle { inertia } else { mass } * (TAU * frequency).powi(2);
-                max_load.min(stiffness * (position[i] - target).abs())
-            }
-            Drive::SpringDamper { target, stiffness, max_load, .. } => {
+            Drive::Spring { target, max_load, .. } | Drive::SpringDamper { target, max_load, .. } => {
+                let [stiffness, _] = spring_constants(joint, i, axis.drive, world);
                 max_load.min(stiffness * (position[i] - target).abs())
             }
         };
-        if is_angle { load / world.bodies[a].smallest_half_extent() } else { load }
+        if i >= 3 { load / world.bodies[a].smallest_half_extent() } else { load }
     };
     axes_of(joint).map(load).sum()
 }
@@ -156,38 +145,72 @@ fn driven(row: AxisRow, drive: Drive, position: f32, h: f32) -> AxisRow {
         Drive::Motor { speed, max_load } => {
             AxisRow { speed, mass_scale: 1.0, max_impulse: largest(max_load, h), ..row }
         }
-        Drive::Spring { target, frequency, damping_ratio, max_load } => {
-            let [rate, impulse_scale] = spring(frequency, damping_ratio, h);
-            let (gap, mass_scale) = (position - target, 1.0 - impulse_scale);
-            AxisRow { gap, rate, mass_scale, impulse_scale, max_impulse: largest(max_load, h), ..row }
-        }
         // [`tune`] completes the row once all masses are known.
-        Drive::SpringDamper { target, max_load, .. } => {
+        Drive::Spring { target, max_load, .. } | Drive::SpringDamper { target, max_load, .. } => {
             AxisRow { gap: position - target, impulse_scale: 1.0, max_impulse: largest(max_load, h), ..row }
         }
         Drive::None => row,
     }
 }
 
-/// Whether a joint has springs with a stiffness and damping of their own.
-pub(super) fn has_spring_dampers(joint: &Joint) -> bool {
-    axes_of(joint).any(|(_, axis)| matches!(axis.drive, Drive::SpringDamper { .. }))
+/// Stiffness and damping of a spring on the axis `i` of a joint (N/m, N s/m; about an axis N m/rad, N m s/rad).
+///
+/// For a spring of a frequency they belong to the mass that two free bodies have at their anchors, by the mean of its
+/// inverse over all directions, or to their reduced inertia about the axis of the joint in each. These are the same in
+/// every pose: a stiffness that followed the moved mass would make energy.
+fn spring_constants(joint: &Joint, i: usize, drive: Drive, world: &World) -> [f32; 2] {
+    let (frequency, damping_ratio) = match drive {
+        Drive::SpringDamper { stiffness, damping, .. } => return [stiffness, damping],
+        Drive::Spring { frequency, damping_ratio, .. } => (frequency, damping_ratio),
+        Drive::None | Drive::Motor { .. } => return [0.0; 2],
+    };
+    let inverse_mass = |body: usize, anchor: Vec3, frame: Quat| {
+        let body = &world.bodies[body];
+        if body.kind != BodyKind::Dynamic {
+            return 0.0;
+        }
+        let turning =
+            if body.has_fixed_rotation() { Mat3::ZERO } else { body.mass.world_inverse_inertia(Quat::IDENTITY) };
+        let about = |axis: Vec3| axis.dot(turning * axis);
+        if i >= 3 {
+            return about(frame * Vec3::AXES[i - 3]);
+        }
+        let arm = anchor - body.mass.center;
+        body.mass.mass.recip() + Vec3::AXES.iter().map(|axis| about(arm.cross(*axis))).sum::<f32>() / 3.0
+    };
+    let (a, b) = joint.indices();
+    let sum = inverse_mass(a, joint.anchor_a, joint.frame_a)
+        + b.map_or(0.0, |b| inverse_mass(b, joint.anchor_b, joint.frame_b));
+    let mass = if sum > 0.0 { sum.recip() } else { 0.0 };
+    let omega = TAU * frequency;
+    [mass * omega * omega, 2.0 * damping_ratio * mass * omega]
 }
 
-/// Completes the rows of springs with a stiffness k and damping c of their own, for substeps of `substep` seconds. With
-/// the present effective mass m, such a spring has the frequency √(k/m)/2π and the damping ratio c/2√(k m).
-pub(super) fn tune(joint: &Joint, number: usize, substep: f32, problem: &mut StepProblem) {
+/// The stiffness of the drive in a row of a joint (N/m, N m/rad).
+pub fn stiffness(joint: &Joint, row: usize, world: &World) -> f32 {
+    let driven = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && axis.bounds != Bounds::Locked);
+    driven.skip(row).map(|(i, axis)| spring_constants(joint, i, axis.drive, world)[0]).next().unwrap_or(0.0)
+}
+
+/// Whether a joint has springs.
+pub(super) fn has_springs(joint: &Joint) -> bool {
+    axes_of(joint).any(|(_, axis)| matches!(axis.drive, Drive::Spring { .. } | Drive::SpringDamper { .. }))
+}
+
+/// Completes the rows of springs, for substeps of `substep` seconds. With the present effective mass m, a spring of the
+/// stiffness k and the damping c has the frequency √(k/m)/2π and the damping ratio c/2√(k m).
+pub(super) fn tune(joint: &Joint, number: usize, substep: f32, world: &World, problem: &mut StepProblem) {
     let row = problem.joints[number];
     let first = row.first_axis as usize;
     for (k, (i, _)) in (first..).zip(kinds(joint).filter(|(_, is_drive)| *is_drive)) {
         let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
-        let Drive::SpringDamper { stiffness, damping, .. } = axis.drive else { continue };
+        let [stiffness, damping] = spring_constants(joint, i, axis.drive, world);
         let inverse_mass = inverse_mass_along(&row, &problem.axes[k], &problem.masses);
         let omega = (stiffness * inverse_mass).sqrt();
         if omega > 0.0 {
             let [rate, impulse_scale] = spring(omega / TAU, 0.5 * damping * inverse_mass / omega, substep);
             let row = &mut problem.axes[k];
-            (row.rate, row.mass_scale, row.impulse_scale) = (rate, 1.0 - impulse_scale, impulse_scale);
+            (row.rate, row.mass_scale, row.impulse_scale) = (rate / inverse_mass, 1.0 - impulse_scale, impulse_scale);
         }
     }
 }

@@ -463,8 +463,8 @@ impl JointRows {
             }
             problem.params.body_count += 1;
         }
-        for (i, joint) in world.joints.iter().enumerate().filter(|(_, joint)| axes::has_spring_dampers(joint)) {
-            axes::tune(joint, i, substep * self.shares[i], problem);
+        for (i, joint) in world.joints.iter().enumerate().filter(|(_, joint)| axes::has_springs(joint)) {
+            axes::tune(joint, i, substep * self.shares[i], world, problem);
         }
     }
 }

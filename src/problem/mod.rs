@@ -26,7 +26,7 @@ mod touching;
 mod write;
 
 pub use arithmetic::{Mass, Sym3};
-pub(crate) use axes::drive_count;
+pub(crate) use axes::{drive_count, stiffness};
 pub use blocks::{Block, lay_out};
 pub(crate) use bodies::pose_after;
 pub use bodies::{begin, store};

@@ -277,7 +277,8 @@ pub struct AxisRow {
     pub speed: f32,
     /// Largest impulse in a substep (N s, N m s).
     pub max_impulse: f32,
-    /// Ratio of the speed in a substep to the gap (1/s), for a spring and for bounds of an axis with a drive.
+    /// Ratio of the speed in a substep to the gap (1/s), for bounds of an axis with a drive. For a spring, ratio of the
+    /// impulse in a substep to the gap (N s/m, N m s/rad).
     pub rate: f32,
     /// Share of the speed that a drive takes away in a substep, 1 for a motor. Bounds have 1 on an axis with a drive,
     /// and 0 on other axes.

@@ -71,9 +71,10 @@ pub enum Drive {
     Spring {
         /// The rest position (m, rad).
         target: f32,
-        /// Frequency at which the bodies would swing about the target without the damper, if they turned about their
-        /// centers of mass and translated freely (Hz). A hinge away from a center of mass turns more inertia and swings
-        /// slower.
+        /// Frequency f at which two free bodies would swing about the target without the damper (Hz). The spring has the
+        /// constant stiffness m (2 π f)². For an angle, m is the inertia of the bodies about the axis; for a translation
+        /// or a distance, it is their mass at the anchors, with the mean over all directions of its inverse. A hinge away
+        /// from a center of mass turns more inertia and swings slower.
         frequency: f32,
         /// Damping ratio: 0 is undamped, 1 is critically damped.
         damping_ratio: f32,

@@ -22,6 +22,8 @@ tests! {
         bodies_of_a_joint_that_is_off_collide_and_wake,
         constants_out_of_range_are_refused,
         springs_of_both_kinds_agree,
+        a_spring_of_a_frequency_has_the_mass_of_two_free_bodies_at_its_anchors,
+        springs_of_a_frequency_keep_their_energy_in_every_pose,
     }
 }
 
@@ -224,4 +226,46 @@ fn bodies_of_a_joint_that_is_off_collide_and_wake() {
         "{}",
         simulation.world.bodies[high].position
     );
+}
+
+/// The first pull of a spring at a deflection of 0.1 m gives its stiffness: that of a ball by 1/m + 2 r²/(3 I), since an impulse across the arm r
+/// turns it and one along the arm does not.
+fn a_spring_of_a_frequency_has_the_mass_of_two_free_bodies_at_its_anchors() {
+    let (mass, radius, frequency, dt) = (3.0_f32, 0.2_f32, 2.0_f32, 1e-4);
+    for arm in [Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.4] {
+        let mut world = weightless();
+        let ball = world.add(Body::dynamic().shape(Shape::ball(radius)).total_mass(mass));
+        world.join(Joint::to_world(ball, arm, arm + Vec3::X * 1.1).elastic(1.0, frequency, 0.0));
+        let mut simulation =
+            Simulation::with(world, SolverConfig::default(), Box::new(drystone::Cpu::new())).expect("a world");
+        simulation.step(dt).expect("a step");
+        let pull = simulation.world.bodies[ball].linear_velocity.x * mass / (0.1 * dt);
+        let inverse_mass = 1.0 / mass + 2.0 * arm.length_squared() / (3.0 * 0.4 * mass * radius * radius);
+        near(&format!("stiffness at {arm}"), pull, (TAU * frequency).powi(2) / inverse_mass, 2e-3);
+    }
+}
+
+/// Angles of a long body whose inertia differs about its axes, and a spring from end to end of two bars.
+fn springs_of_a_frequency_keep_their_energy_in_every_pose() {
+    let bar = || Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).total_mass(2.0);
+    for frequency in [0.5, 2.0] {
+        let spring = Axis::FREE.spring(0.0, frequency, 0.0, f32::MAX);
+        let mut angles = weightless();
+        let turned = Quat::from_scaled_axis(Vec3::new(0.4, 0.9, -0.6));
+        let body = angles.add(bar().rotation(turned));
+        angles.join(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::LOCKED; 3], [spring; 3]));
+        let mut ends = weightless();
+        let bars = [0.0, 1.0].map(|z| ends.add(bar().position(0.0, 0.0, z)));
+        ends.join(Joint::new(bars[0], Vec3::X * 0.5, bars[1], Vec3::X * -0.5).elastic(1.0, frequency, 0.0));
+        for (name, world) in [("angles", angles), ("ends", ends)] {
+            let mut simulation = simulation(world, || Box::new(drystone::Cpu::new()));
+            let (mut early, mut late) = (0.0_f64, 0.0_f64);
+            for step in 0..3600 {
+                simulation.step(DT).expect("a step");
+                let most = if step < 900 { &mut early } else { &mut late };
+                *most = most.max(simulation.world.kinetic_energy());
+            }
+            assert!(late < 1.02 * early, "{name} at {frequency} Hz: at most {early} J in 4 s, {late} J later");
+        }
+    }
 }

@@ -86,7 +86,8 @@ struct Stand {
     is_angle: bool,
     /// Of body a against body b (m, rad).
     position: f64,
-    /// One over the mass, or the inertia, that moves along it or about it.
+    /// One over the mass that the free bodies have at the anchors, in the mean of all directions, or over their reduced inertia about the axis in
+    /// each.
     inverse_mass: f64,
 }
 
@@ -120,41 +121,40 @@ fn stands(world: &World, joint: &Joint) -> Vec<Stand> {
     let apart = at_a - at_b;
     let frame = b.map_or(DQuat::IDENTITY, rotation) * joint.frame_b.as_dquat().normalize();
     let motion = world.joint_motion(joint);
-    let sides = [a, b].map(|body| body.filter(|body| body.kind == BodyKind::Dynamic).map(|body| (center(body), body)));
-    let along = |n: DVec3| -> f64 {
-        let of = |side: &(DVec3, &Body)| {
-            // The force acts at the anchor of a, on both.
-            let about = (at_a - side.0).cross(n);
-            1.0 / f64::from(side.1.mass.mass) + about.dot(inertia(side.1).inverse() * about)
-        };
-        sides.iter().flatten().map(of).sum()
-    };
-    let about = |n: DVec3| -> f64 { sides.iter().flatten().map(|(_, body)| n.dot(inertia(body).inverse() * n)).sum() };
     let unit = [DVec3::X, DVec3::Y, DVec3::Z];
+    let sides = [(a, joint.frame_a, joint.anchor_a), (b, joint.frame_b, joint.anchor_b)];
+    let inverse_mass = |of: &dyn Fn(&Body, DQuat, DVec3) -> f64| -> f64 {
+        let movable = sides.iter().filter_map(|(body, frame, anchor)| {
+            Some((body.filter(|body| body.kind == BodyKind::Dynamic)?, frame, anchor))
+        });
+        movable.map(|(body, frame, anchor)| of(body, frame.as_dquat().normalize(), anchor.as_dvec3())).sum()
+    };
     let mut all: Vec<Stand> = Vec::with_capacity(6);
     for (i, &axis) in linear.iter().enumerate() {
         let n = if is_distance { apart.normalize_or(frame * DVec3::X) } else { frame * unit[i] };
-        all.push(Stand { axis, is_angle: false, position: n.dot(apart), inverse_mass: along(n) });
+        let along = |body: &Body, _: DQuat, anchor: DVec3| {
+            let arm = rotation(body) * (anchor - body.mass.center.as_dvec3());
+            let turned = unit.map(|axis| arm.cross(axis)).map(|about| about.dot(inertia(body).inverse() * about));
+            1.0 / f64::from(body.mass.mass) + turned.iter().sum::<f64>() / 3.0
+        };
+        all.push(Stand { axis, is_angle: false, position: n.dot(apart), inverse_mass: inverse_mass(&along) });
     }
     for (i, &axis) in joint.angular.iter().enumerate() {
-        let n = if i == 0 { twist_direction(joint, a, frame) } else { frame * unit[i] };
-        all.push(Stand { axis, is_angle: true, position: f64::from(motion.position[3 + i]), inverse_mass: about(n) });
+        let about = |body: &Body, frame: DQuat, _: DVec3| {
+            let own = frame * unit[i];
+            let turned = rotation(body) * own;
+            turned.dot(inertia(body).inverse() * turned)
+        };
+        let position = f64::from(motion.position[3 + i]);
+        all.push(Stand { axis, is_angle: true, position, inverse_mass: inverse_mass(&about) });
     }
     all
 }
 
-/// The direction about which the first angle of a joint turns: the middle between the first axes of its bodies.
-fn twist_direction(joint: &Joint, a: Option<&Body>, frame_b: DQuat) -> DVec3 {
-    let first_a = a.map_or(DQuat::IDENTITY, rotation) * joint.frame_a.as_dquat().normalize() * DVec3::X;
-    let first_b = frame_b * DVec3::X;
-    let both = 1.0 + first_a.dot(first_b);
-    if both > 1e-3 { (first_a + first_b) / both } else { first_b }
-}
-
 /// The stiffness of a spring of the caller (N/m, N m/rad), its distance from where it is at rest, and the most that it bears.
 ///
-/// [`Drive::Spring`] has a frequency: the stiffness is that of the mass that moves along the axis now. It is constant along the axis of a slider,
-/// about that of a hinge, and between two centers of mass; elsewhere it changes as the bodies turn.
+/// [`Drive::Spring`] has a frequency: the stiffness is that of the mass that its free bodies have at the anchors, by the mean of its inverse over all
+/// directions, or of their reduced inertia about the axis of the joint in each.
 struct Spring {
     stiffness: f64,
     gap: f64,
@@ -182,9 +182,8 @@ impl Spring {
 }
 
 /// The energy of the springs of the caller.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Springs {
-    springs: Vec<(f64, f64, f64)>,
     /// (J)
     pub energy: f64,
 }
@@ -199,30 +198,11 @@ impl Springs {
                 Linear::Distance(distance) => has_spring(distance),
             };
             if linear || joint.angular.iter().any(has_spring) {
-                for spring in stands(world, joint).iter().filter_map(Spring::of) {
-                    all.energy += spring.energy();
-                    all.springs.push((spring.stiffness, spring.gap, spring.most));
-                }
+                all.energy +=
+                    stands(world, joint).iter().filter_map(Spring::of).map(|spring| spring.energy()).sum::<f64>();
             }
         }
         all
-    }
-
-    /// The work that became of the change of stiffness since `before`, and how wrong it may be.
-    ///
-    /// A spring whose stiffness k goes to k + dk at a gap x gains dk x²/2. Where k and x² grow or fall steadily within the step, the work is
-    /// between the values at the least and at the largest x², and the middle of both is wrong by half of their difference.
-    pub fn stiffening(&self, before: &Self) -> (f64, f64) {
-        let pairs = self.springs.iter().zip(&before.springs);
-        pairs.fold((0.0, 0.0), |(work, error), (&(k, x, most), &(k_before, x_before, _))| {
-            let free = |k: f64, x: f64| x.abs().min(most / k.max(1e-300)).powi(2);
-            let (square, square_before) = (free(k, x), free(k_before, x_before));
-            let change = 0.5 * (k - k_before);
-            // Rounding of the angles and inertias changes k by 1e-6 of itself.
-            let is_constant = (k - k_before).abs() < 1e-5 * k;
-            let slack = if is_constant { 0.0 } else { change.abs() * 0.5 * (square - square_before).abs() };
-            (work + change * 0.5 * (square + square_before), error + slack)
-        })
     }
 }
 

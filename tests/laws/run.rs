@@ -340,14 +340,14 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
         simulation.world.dynamic().map(|b| f64::from(b.mass.mass) * size(b)).sum::<f64>() * gravity.length().max(1.0);
     let dynamic: Vec<usize> =
         (0..simulation.world.bodies.len()).filter(|&i| simulation.world.bodies[i].kind == BodyKind::Dynamic).collect();
-    let (mut before, mut springs_before) = (Mechanics::of(&simulation.world), Springs::of(&simulation.world));
+    let (mut before, springs_at_start) = (Mechanics::of(&simulation.world), Springs::of(&simulation.world));
     let start = before;
     let motion = |m: &Mechanics| if alone { m.kinetic - m.common } else { m.kinetic };
     let energy = |m: &Mechanics, s: &Springs| motion(m) + s.energy + if alone { 0.0 } else { m.potential };
-    let in_motion = motion(&start) + springs_before.energy;
-    let mut passivity = Passivity::new(energy(&start, &springs_before), in_motion);
+    let in_motion = motion(&start) + springs_at_start.energy;
+    let mut passivity = Passivity::new(energy(&start, &springs_at_start), in_motion);
     let (mut pushed, mut open) = (Overlaps::new(), open_joints(&simulation.world));
-    let (mut work, mut given, mut slack, mut push_left) = (0.0, 0.0, 0.0, 0.0);
+    let (mut work, mut given, mut push_left) = (0.0, 0.0, 0.0);
     let (mut momenta, mut spins) = (start.momenta, start.spins);
     let (mut drift, mut rounding) = ([0.0_f64; 2], Rounding::default());
     for step in 0..case.steps() {
@@ -387,12 +387,9 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
         }
         work += power * dt;
         given += power * dt;
-        let (stiffening, error) = springs.stiffening(&springs_before);
-        work += stiffening;
-        slack += error;
         let is_pushing = !pushed.is_empty() || !open.is_empty();
         let allowance = SHARE_OF_WEIGHT * weight + push_left;
-        let total = energy(&after, &springs) - work - slack;
+        let total = energy(&after, &springs) - work;
         if !passivity.follow(total, motion(&after) + springs.energy, allowance) && verdict.broken_at.is_none() {
             verdict.broken_at = Some(step);
         }
@@ -429,7 +426,7 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
                 if alone { (after.spin - start.spin).length() } else { 0.0 },
             ]);
         }
-        (before, springs_before) = (after, springs);
+        before = after;
     }
     verdict.work = given;
     verdict.scale += given;

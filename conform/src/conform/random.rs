@@ -197,6 +197,8 @@ pub fn heavier(mut problem: StepProblem, factor: f32) -> StepProblem {
     }
     problem.points.iter_mut().flat_map(|row| [&mut row.normal_mass, &mut row.tangent_mass]).for_each(scale);
     problem.axes.iter_mut().map(|row| &mut row.max_impulse).for_each(scale);
+    // The rate of a spring is an impulse.
+    problem.axes.iter_mut().filter(|row| row.impulse_scale > 0.0).map(|row| &mut row.rate).for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.impulses).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.totals).iter_mut().for_each(scale);
     bytemuck::cast_slice_mut(&mut problem.joint_impulses).iter_mut().for_each(scale);
