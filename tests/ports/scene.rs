@@ -106,3 +106,23 @@ pub fn lowest(world: &World) -> f32 {
 pub fn fastest(world: &World) -> f32 {
     world.dynamic().map(|body| body.linear_velocity.length()).fold(0.0, f32::max)
 }
+
+/// Fails unless two numbers are at most `within` apart.
+#[track_caller]
+pub fn assert_about(found: f32, wanted: f32, within: f32) {
+    assert!((found - wanted).abs() <= within, "{found}, not {wanted} within {within}");
+}
+
+/// Fails unless two vectors are at most `within` apart.
+#[track_caller]
+pub fn assert_near(found: Vec3, wanted: Vec3, within: f32) {
+    let apart = found.distance(wanted);
+    assert!(apart <= within, "{found}, not {wanted} within {within}, but {apart}");
+}
+
+/// Fails unless the quaternions of two rotations differ by at most `within`.
+#[track_caller]
+pub fn assert_turned(found: Quat, wanted: Quat, within: f32) {
+    let apart = (found - wanted).length().min((found + wanted).length());
+    assert!(apart <= within, "{found}, not {wanted} within {within}, but {apart}");
+}
