@@ -276,3 +276,100 @@ fn a_game_comes_back_from_its_scene_file_with_the_same_bits() {
     run(&mut again, 60);
     assert_eq!(again.hash(), simulation.hash());
 }
+
+/// The answer to a world with one mistake.
+fn refusal(mistake: impl Fn(&mut World)) -> String {
+    let mut world = World::new();
+    world.insert(floor().named("floor"));
+    mistake(&mut world);
+    let line = Simulation::new(world).err().expect("it is refused").to_string();
+    assert_eq!(line.lines().count(), 1, "{line}");
+    line
+}
+
+/// Bad bodies. Each answer names the body and the number.
+#[test]
+fn a_bad_body_is_refused_with_its_name_and_the_number() {
+    let crate_ = || Body::dynamic().shape(cube(0.5)).named("crate");
+    let shaped = |shape: Shape| Body::dynamic().shape(shape).named("crate");
+    let nothing = || Body::dynamic().named("crate");
+    let quaternion = |w: f32| Quat::from_xyzw(0.0, 0.0, 0.0, w);
+    let bodies = [
+        ("position", crate_().position(f32::NAN, 0.0, 0.0)),
+        ("position", crate_().position(1e10, 0.0, 0.0)),
+        ("velocity", crate_().velocity(Vec3::splat(f32::INFINITY), Vec3::ZERO)),
+        ("rotation", crate_().rotation(quaternion(0.0))),
+        ("rotation", crate_().rotation(quaternion(2.0))),
+        ("density = 0", crate_().density(0.0)),
+        ("mass = -1", crate_().total_mass(-1.0)),
+        ("needs a shape", nothing()),
+        ("needs a shape", nothing().sensor(cube(0.5))),
+        ("ball", shaped(Shape::ball(-1.0))),
+        ("ball", shaped(Shape::ball(f32::NAN))),
+        ("cuboid", shaped(Shape::cuboid(0.5, 0.0, 0.5))),
+        ("half-space", shaped(Shape::half_space(Vec3::Y))),
+        ("friction = -0.1", crate_().friction(-0.1)),
+        ("friction = NaN", crate_().friction(f32::NAN)),
+        ("restitution = 1.5", crate_().restitution(1.5)),
+    ];
+    for (named, body) in bodies {
+        let line = refusal(|world| {
+            world.insert(body.clone());
+        });
+        assert!(line.contains("crate") && line.contains(named), "{named}: {line}");
+    }
+}
+
+/// Bad joints. Each answer names the joint.
+#[test]
+fn a_bad_joint_is_refused_with_its_number() {
+    type Mistake = fn(BodyHandle, BodyHandle) -> Joint;
+    let joints: [(&str, Mistake); 8] = [
+        ("beyond the last", |a, _| Joint::new(a, Vec3::ZERO, 99, Vec3::ZERO)),
+        ("a body with itself", |a, _| Joint::new(a, Vec3::ZERO, a, Vec3::X)),
+        ("two fixed bodies", |_, b| Joint::new(b, Vec3::ZERO, 0, Vec3::X)),
+        ("a NaN anchor", |a, _| Joint::to_world(a, vec3(f32::NAN, 0.0, 0.0), Vec3::Y)),
+        ("no direction", |a, _| Joint::to_world(a, Vec3::ZERO, Vec3::Y).hinge(Vec3::ZERO)),
+        ("reversed limits", |a, _| Joint::to_world(a, Vec3::ZERO, Vec3::Y).hinge(Vec3::Z).limited(1.0, -1.0)),
+        ("limits of nothing", |a, _| Joint::to_world(a, Vec3::ZERO, Vec3::Y).fixed().limited(-0.5, 0.5)),
+        ("a motor of nothing", |a, _| Joint::to_world(a, Vec3::ZERO, Vec3::Y).fixed().motor(1.0, 1.0)),
+    ];
+    for (mistake, joint) in joints {
+        let line = refusal(|world| {
+            let a = world.insert(Body::dynamic().shape(cube(0.5)).position(0.0, 3.0, 0.0));
+            let b = world.insert(Body::fixed().shape(cube(0.5)));
+            world.insert_joint(joint(a, b));
+        });
+        assert!(line.starts_with("joint 0"), "{mistake}: {line}");
+    }
+}
+
+/// Bad meshes, fields and hulls, bad lengths of steps, and more steps back than are kept.
+#[test]
+fn bad_shapes_and_bad_calls_are_refused() {
+    let nan = f32::NAN;
+    let bad = [
+        Shape::mesh(vec![], vec![]),
+        Shape::mesh(vec![Vec3::ZERO; 3], vec![[0, 1, 7]]),
+        Shape::mesh(vec![Vec3::ZERO, Vec3::X, Vec3::splat(nan)], vec![[0, 1, 2]]),
+        Shape::height_field(&[vec![0.0]], Vec3::ONE),
+        Shape::height_field(&[vec![0.0, 1.0], vec![0.0]], Vec3::ONE),
+        Shape::height_field(&[vec![0.0, nan], vec![0.0, 0.0]], Vec3::ONE),
+        Shape::convex_hull(&[]),
+        Shape::convex_hull(&[Vec3::ZERO, Vec3::X, Vec3::Y, vec3(1.0, 1.0, 0.0)]),
+        Shape::convex_hull(&[Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(nan)]),
+    ];
+    assert!(bad.iter().all(Result::is_err), "{bad:?}");
+    let (mut simulation, _) = game();
+    let mut rollback = Rollback::new(4);
+    for _ in 0..6 {
+        rollback.push(&simulation);
+        run(&mut simulation, 1);
+    }
+    let hash = simulation.hash();
+    for dt in [0.0, -0.01, nan, 10.0] {
+        assert!(simulation.step(dt).is_err(), "{dt} s");
+    }
+    assert!(rollback.back(9, &mut simulation).is_err());
+    assert_eq!(simulation.hash(), hash);
+}

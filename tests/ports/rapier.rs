@@ -377,8 +377,8 @@ fn meshed(shape: &Shape) -> Shape {
     Shape::mesh(vertices, triangles).expect("a mesh")
 }
 
-/// Rapier, debug_internal_edges3, without the box, which tumbles aside on a slab as well: a ball and a cylinder at 20 m/s
-/// over 10,000 triangles.
+/// Rapier, debug_internal_edges3: a ball and a cylinder at 20 m/s over 10,000 triangles. The box of the example is left
+/// out: it tumbles aside on a slab as well.
 #[test]
 fn inner_edges_of_fields_and_meshes_push_nothing_aside() {
     for is_mesh in [false, true] {
@@ -965,7 +965,7 @@ fn springs_of_a_stiffness_swing_as_their_closed_form_says() {
 
 /// Rapier, spring_joints3, for damping ratios from 1 to 2.
 #[test]
-#[ignore = "a ball with twice the critical damping is 0.18 m off: a damper of a substep is weaker than that of the closed form"]
+#[ignore = "0.18 m off at twice the critical damping: a substep damps less than the closed form"]
 fn springs_with_more_than_critical_damping_creep_as_their_closed_form_says() {
     let worst = worst_spring(16..=30);
     assert!(worst < 0.1, "{worst} m");
@@ -1223,7 +1223,7 @@ fn a_character_climbs_stairs_and_slopes_and_slides_along_walls() {
     assert!((end.x - 1.2).abs() < 0.02 && (end.z - 3.0).abs() < 0.02, "along the wall to {end}");
 }
 
-/// Rapier, trimesh3 on a flat mesh: the character of the examples, and a body that it pushes.
+/// Rapier, character_controller3: a box that the character pushes, here over a mesh.
 #[test]
 fn a_character_pushes_a_light_box_over_a_mesh() {
     let mut world = World::new();

@@ -1,4 +1,4 @@
-//! The tests of Rapier's crates, many of which hold an issue closed, and falls from heights that Rapier was seen to hold.
+//! The tests of Rapier's crates, many of which keep an issue closed, and falls that Rapier was seen to stop.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -10,26 +10,48 @@ use crate::scene::{
     weightless,
 };
 
-/// Rapier, issue 182.
-#[test]
-fn a_capsule_crosses_the_seam_of_two_height_fields() {
+/// The most that a capsule at 2 m/s leaves its height (m) on the way over the seam of two of these squares of 16 m.
+fn bump_at_seam(square: &Shape) -> f32 {
     let mut world = World::new();
-    let field = Shape::height_field(&vec![vec![0.0; 17]; 17], vec3(16.0, 1.0, 16.0)).expect("a field");
-    world.insert(Body::fixed().shape(field.clone()));
-    world.insert(Body::fixed().shape(field).position(16.0, 0.0, 0.0));
+    world.insert(Body::fixed().shape(square.clone()));
+    world.insert(Body::fixed().shape(square.clone()).position(16.0, 0.0, 0.0));
     let capsule = light().friction(0.0).shape(Shape::capsule(0.3, 0.3)).locked_rotations([true; 3]);
     let capsule = world.insert(capsule.position(0.0, 0.7, 0.0));
     let mut simulation = started(world);
     run(&mut simulation, 120);
     let rest = place(&simulation, capsule).y;
     assert!((rest - 0.6).abs() < 2e-3, "it rests at {rest} m");
-    for step in 0..480 {
+    let mut bump = 0.0_f32;
+    for _ in 0..480 {
         body_mut(&mut simulation, capsule).linear_velocity.x = 2.0;
         run(&mut simulation, 1);
-        let y = place(&simulation, capsule).y;
-        assert!((y - rest).abs() < 0.05, "step {step}: {y} m");
+        bump = bump.max((place(&simulation, capsule).y - rest).abs());
     }
     assert!(place(&simulation, capsule).x > 12.0);
+    bump
+}
+
+/// A level height field of 16 m.
+fn field() -> Shape {
+    Shape::height_field(&vec![vec![0.0; 17]; 17], vec3(16.0, 1.0, 16.0)).expect("a field")
+}
+
+/// Rapier, issue 182.
+#[test]
+fn a_capsule_crosses_the_seam_of_two_height_fields() {
+    let bump = bump_at_seam(&field());
+    assert!(bump < 0.05, "{bump} m");
+    let (vertices, triangles) = field().triangles();
+    let bump = bump_at_seam(&Shape::mesh(vertices, triangles).expect("a mesh"));
+    assert!(bump < 1e-4, "{bump} m between meshes");
+}
+
+/// Rapier, issue 182, with the figure of a seam between meshes.
+#[test]
+#[ignore = "a bump of 6.5 mm at the seam of height fields, for balls too; none at that of meshes"]
+fn the_seam_of_two_height_fields_has_no_bump() {
+    let bump = bump_at_seam(&field());
+    assert!(bump < 1e-4, "{bump} m");
 }
 
 /// Steps until a body sleeps, at most 2,000.
@@ -102,7 +124,7 @@ fn slow_on_a_mesh(rolling_friction: f32) -> [usize; 2] {
 
 /// Rapier, issue 372, without rolling friction.
 #[test]
-#[ignore = "the ball rolls on at 2 cm/s and is awake after 2,000 steps: bodies sleep below 1 cm/s, in Rapier below 5 cm/s"]
+#[ignore = "both roll on and are awake after 2,000 steps: bodies sleep below 1 cm/s, in Rapier below 5"]
 fn a_slow_ball_and_a_slow_capsule_on_a_mesh_fall_asleep() {
     let steps = slow_on_a_mesh(0.0);
     assert!(steps.iter().all(|&steps| steps < 2000), "{steps:?} steps");
