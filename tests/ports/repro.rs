@@ -35,7 +35,7 @@ fn limits_of_three_angles_give_no_energy_to_a_limb() {
     }
 }
 
-/// The most kinetic energy of plates that three equal springs turn back, over that of their start, where the springs are
+/// The most kinetic energy of plates that three equal springs turn back, over that of the start. There, the springs are
 /// at rest.
 fn most_energy_of_springs(spring: impl Fn(f32, f32) -> Axis) -> f64 {
     let mut most = 0.0_f64;
