@@ -1143,7 +1143,7 @@ fn a_platform_that_is_switched_off_lets_its_box_fall() {
 
 /// Rapier, platform3: boxes on a kinematic platform that is sent to places.
 #[test]
-fn boxes_ride_on_a_platform_without_a_slip() {
+fn boxes_ride_on_a_platform_for_ten_seconds() {
     let mut world = World::new();
     let platform = world.insert(Body::kinematic().shape(Shape::cuboid(5.0, 0.5, 5.0)));
     let mut boxes = Vec::new();
