@@ -385,7 +385,7 @@ fn stack_at(x: f32) -> (Vec<Vec3>, bool) {
 fn a_stack_far_from_the_origin_settles_as_at_the_origin() {
     let (here, sleeps) = stack_at(0.0);
     assert!(sleeps);
-    for x in [1e3, 1e4, 1e5] {
+    for x in [1e3, 1e4, 1e5, 1e6] {
         let (there, sleeps) = stack_at(x);
         assert!(sleeps, "at {x} m");
         here.iter().zip(&there).for_each(|(here, there)| assert_about(there.y, here.y, 1e-3));
@@ -686,6 +686,77 @@ fn a_thin_plate_lands_on_four_needles() {
     assert!(y > 0.95, "{y}");
 }
 
+/// Box3D, Continuous: Hump Mesh.
+#[test]
+fn a_thin_plate_at_50_m_per_s_does_not_pass_a_hump() {
+    let points = (0..6)
+        .map(|i| vec3(8.0 * (i / 3) as f32 - 4.0, if i % 3 == 1 { 0.4 } else { 0.0 }, 8.0 * (i % 3) as f32 - 8.0));
+    let triangles = [0, 1].into_iter().flat_map(|i| [[i, i + 1, i + 4], [i + 4, i + 3, i]]);
+    let hump = Shape::mesh(points.collect(), triangles.collect()).expect("a hump");
+    let mut world = sample();
+    world.insert(fixed(hump));
+    let plate = dynamic(Shape::cuboid(0.5, 0.05, 1.0)).position(0.0, 5.0, 0.0).velocity(-50.0 * Vec3::Y, Vec3::ZERO);
+    let plate = world.insert(plate);
+    let mut simulation = started(world);
+    run_with(&mut simulation, 300, |simulation, step| {
+        let at = place(simulation, plate);
+        let height = 0.4 - 0.05 * at.z.abs();
+        assert!(at.y > height, "{at} in step {step}");
+    });
+}
+
+/// Box3D, Continuous: Is Fast.
+#[test]
+fn long_boxes_spin_freely_at_4_rad_per_s() {
+    let mut world = sample();
+    let spins = [4.0 * Vec3::Z, 4.0 * Vec3::Y, 4.0 * Vec3::X].into_iter().zip([-12.0, 0.0, 12.0]);
+    let boxes: Vec<_> = spins
+        .map(|(spin, x)| {
+            let long = dynamic(Shape::cuboid(0.5, 10.0, 0.5)).gravity_scale(0.0).position(x, 20.0, 0.0);
+            (world.insert(long.velocity(Vec3::ZERO, spin)), spin, x)
+        })
+        .collect();
+    let mut simulation = started(world);
+    run(&mut simulation, 600);
+    for (handle, spin, x) in boxes {
+        let found = body(&simulation, handle);
+        assert_near(found.angular_velocity, spin, 1e-3);
+        assert_near(found.position, vec3(x, 20.0, 0.0), 1e-4);
+    }
+}
+
+/// Box3D, Continuous: Stall, with a torus of 40 by 40 quads in place of 200 by 200.
+#[test]
+fn a_bullet_stops_at_a_torus_of_triangles() {
+    let (count, large, small) = (40, 2.0_f32, 1.0_f32);
+    let angle = |i: u32| 2.0 * PI * i as f32 / count as f32;
+    let points = (0..count * count).map(|k| {
+        let ((sin, cos), (up, out)) = (angle(k / count).sin_cos(), angle(k % count).sin_cos());
+        let radius = large + small * out;
+        vec3(radius * cos, small * up, radius * sin)
+    });
+    let triangles = (0..count * count).flat_map(|k| {
+        let (i, j) = (k / count, k % count);
+        let at = |i: u32, j: u32| i % count * count + j % count;
+        let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+        [[a, b, c], [a, c, d]]
+    });
+    let torus = Shape::mesh(points.collect(), triangles.collect()).expect("a torus");
+    for speed in [100.0, 400.0] {
+        let mut world = weightless();
+        world.insert(fixed(torus.clone()));
+        let bullet = dynamic(Shape::ball(0.1)).position(-10.0, 0.3, 0.0).velocity(speed * Vec3::X, Vec3::ZERO);
+        let bullet = world.insert(bullet);
+        let mut simulation = started(world);
+        run_with(&mut simulation, 30, |simulation, step| {
+            let at = place(simulation, bullet);
+            let out = at.x.hypot(at.z) - large;
+            assert!(out.hypot(at.y) > small, "{at} in step {step} at {speed} m/s");
+        });
+        assert!(body(&simulation, bullet).linear_velocity.x < 0.9 * speed);
+    }
+}
+
 // Samples: Stacking, Robustness
 
 /// Box3D, Stacking: Card House.
@@ -723,6 +794,98 @@ fn a_house_of_40_cards_of_2_mm_stands() {
         // Half the distance between two cards.
         assert!(moved < 0.0875, "{moved} m from {before}");
     }
+}
+
+/// Lets bodies fall on each other, runs for a time, and returns how far each lies from a stack with this pitch.
+fn stack(count: usize, pitch: f32, first: f32, gap: f32, steps: usize, of: impl Fn() -> Body) -> (f32, bool) {
+    let mut world = sample();
+    let bodies: Vec<_> = (0..count).map(|i| world.insert(of().position(0.0, first + gap * i as f32, 0.0))).collect();
+    let mut simulation = started(world);
+    run(&mut simulation, steps);
+    let off = |(i, handle): (usize, &BodyHandle)| {
+        place(&simulation, *handle).distance((0.5 * pitch + pitch * i as f32) * Vec3::Y)
+    };
+    let worst = bodies.iter().enumerate().map(off).fold(0.0, f32::max);
+    (worst, bodies.iter().all(|handle| simulation.is_asleep(handle.index())))
+}
+
+/// Box3D, Stacking: Sphere Stack, with its rolling resistance.
+#[test]
+fn thirty_balls_fall_on_each_other_and_stand() {
+    let material = Material { friction: 0.6, rolling_friction: 0.1 * 0.5, ..Material::default() };
+    let (off, sleeps) = stack(30, 1.0, 0.75, 1.5, 900, || Body::dynamic().shape(Shape::ball(0.5)).material(material));
+    assert!(off < 0.05 && sleeps, "{off} m off, asleep: {sleeps}");
+}
+
+/// Box3D, Stacking: Capsule Stack.
+#[test]
+fn twenty_capsules_with_locked_rotations_stand() {
+    let lying = Quat::from_rotation_z(0.5 * PI);
+    let of = || {
+        let capsule = Body::dynamic().shape_at(Shape::capsule(1.0, 0.5), Vec3::ZERO, lying).friction(0.6);
+        capsule.locked_rotations([true; 3]).locked_translations([false, false, true])
+    };
+    let (off, sleeps) = stack(20, 1.0, 0.75, 1.0, 600, of);
+    assert!(off < SLOP && sleeps, "{off} m off, asleep: {sleeps}");
+}
+
+/// Box3D, Stacking: Cylinder Stack, of 10 cylinders.
+#[test]
+fn ten_cylinders_fall_on_each_other_and_stand() {
+    let (off, sleeps) = stack(10, 1.0, 0.6, 1.1, 600, || dynamic(Shape::cylinder(0.5, 0.5)));
+    assert!(off < 0.25 && sleeps, "{off} m off, asleep: {sleeps}");
+}
+
+/// Box3D, Stacking: Box Stack, of 40 boxes with gaps of a quarter.
+#[test]
+fn forty_boxes_fall_on_each_other_and_stand() {
+    let (off, _) = stack(40, 1.0, 0.75, 1.25, 1200, || dynamic(cube(0.5)));
+    assert!(off < 0.25, "{off} m off");
+}
+
+/// Box3D, Stacking: Pyramid2D, of 12 boxes at its base, held in a plane by locks.
+#[test]
+fn a_pyramid_falls_together_in_its_plane() {
+    let mut world = sample();
+    let mut boxes = Vec::new();
+    for row in 0..12 {
+        for column in 0..12 - row {
+            let x = -10.0 + 2.0 * column as f32 + row as f32;
+            let body = dynamic(cube(1.0)).position(x, 1.5 + 2.5 * row as f32, 0.0);
+            let body = body.locked_translations([false, false, true]).locked_rotations([true, true, false]);
+            boxes.push((world.insert(body), vec3(x, 1.0 + 2.0 * row as f32, 0.0)));
+        }
+    }
+    let mut simulation = started(world);
+    run(&mut simulation, 600);
+    for (handle, wanted) in boxes {
+        let found = body(&simulation, handle);
+        assert_near(found.position, wanted, 0.5);
+        assert_eq!((found.position.z, found.rotation.x, found.rotation.y), (0.0, 0.0, 0.0));
+    }
+}
+
+/// Box3D, Stacking: Double Domino.
+#[test]
+fn fifteen_dominoes_fall_in_order() {
+    let mut world = sample();
+    let dominoes: Vec<_> = (0..15)
+        .map(|i| {
+            let domino = dynamic(Shape::cuboid(0.125, 0.5, 0.25)).density(4.0);
+            world.insert(domino.position(-7.5 + 1.01 * i as f32, 0.5, 0.0))
+        })
+        .collect();
+    world.body_mut(dominoes[0]).expect("it is there").apply_impulse_at(0.2 * Vec3::X, vec3(-7.5, 1.0, 0.0));
+    let mut simulation = started(world);
+    let mut fell = vec![None; 15];
+    run_with(&mut simulation, 900, |simulation, step| {
+        for (&handle, fell) in dominoes.iter().zip(&mut fell) {
+            if super::scene::upright(body(simulation, handle)) < 0.8 {
+                fell.get_or_insert(step);
+            }
+        }
+    });
+    assert!(fell.iter().all(Option::is_some) && fell.is_sorted(), "{fell:?}");
 }
 
 /// Box3D, Stacking: Jenga Stack, with the height that Rapier keeps.
@@ -982,6 +1145,58 @@ fn a_ragdoll_gains_no_energy_from_the_limits_of_its_joints() {
         assert!(energy <= 1.001 * start, "{energy} J of {start} J in step {step}");
     });
     assert!(simulation.world.joint_gap() < SLOP);
+}
+
+/// Box3D, Joints: Weld, with an angular spring of 2 Hz. A torque turns it by its angle over the stiffness.
+#[test]
+fn a_soft_weld_turns_by_the_torque_over_its_stiffness() {
+    let mut world = World::new();
+    let held = dynamic(Shape::cuboid(0.5, 1.5, 0.25)).gravity_scale(0.0).position(0.0, 4.0, 0.0);
+    let held = world.insert(held);
+    let stiffness = 50_000.0;
+    let soft = Axis::FREE.spring_damper(0.0, stiffness, 5_000.0, f32::MAX);
+    let weld = Joint::to_world(held, 1.5 * Vec3::Y, 5.5 * Vec3::Y).generic([Axis::LOCKED; 3], [soft; 3]);
+    world.insert_joint(weld);
+    world.body_mut(held).expect("it is there").torque = 0.1 * stiffness * Vec3::Z;
+    let mut simulation = started(world);
+    run(&mut simulation, 900);
+    assert_about(twist(body(&simulation, held).rotation, Vec3::Z), 0.1, 1e-3);
+    assert!(simulation.world.joint_gap() < SLOP);
+}
+
+/// A gear of 16 teeth on a hinge, with its rolling circle at 1 m.
+fn gear(world: &mut World, x: f32, turn: f32, of: impl Fn(Joint) -> Joint) -> BodyHandle {
+    let lying = Quat::from_rotation_x(0.5 * PI);
+    let core = Body::dynamic().shape_at(Shape::cylinder(0.1, 0.9), Vec3::ZERO, lying).friction(0.1);
+    let gear = (0..16).fold(core, |body, tooth| {
+        let turned = Quat::from_rotation_z(PI / 8.0 * tooth as f32);
+        let ring = [(0.85, 0.11), (1.0, 0.085), (1.1, 0.04)];
+        let points = ring.into_iter().flat_map(|(r, half)| {
+            [-1.0, 1.0].into_iter().flat_map(move |side| [-0.1, 0.1].map(|z| vec3(r, side * half, z)))
+        });
+        body.shape_at(Shape::convex_hull(&points.collect::<Vec<_>>()).expect("a tooth"), Vec3::ZERO, turned)
+    });
+    let gear = world.insert(gear.position(x, 0.0, 0.0).rotation(Quat::from_rotation_z(turn)));
+    world.insert_joint(of(Joint::to_world(gear, Vec3::ZERO, x * Vec3::X).hinge(Vec3::Z)));
+    gear
+}
+
+/// Box3D, Joints: Gear Lift, the gears.
+#[test]
+fn a_gear_turns_another_by_its_teeth() {
+    let mut world = World::new();
+    let driver = gear(&mut world, 0.0, 0.0, |joint| joint.motor(1.0, 30_000.0));
+    let follower = gear(&mut world, 2.02, PI / 16.0, |joint| joint.motor(0.0, 0.5));
+    let mut simulation = started(world);
+    let mut turned = [0.0_f32; 2];
+    run_with(&mut simulation, 600, |simulation, _| {
+        for (sum, handle) in turned.iter_mut().zip([driver, follower]) {
+            *sum += body(simulation, handle).angular_velocity.z * DT;
+        }
+    });
+    assert_about(turned[0], 10.0, 0.1);
+    // The play of a tooth.
+    assert_about(turned[1], -10.0, 0.1);
 }
 
 // Samples: Bodies, Shapes, Events
