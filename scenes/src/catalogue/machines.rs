@@ -5,7 +5,6 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 use glam::{Quat, Vec3};
 
 use super::common::floor;
-use super::vehicle::suspension;
 use crate::scene::Scene;
 use drystone::stages::math::rotation::{about, arc, product};
 use drystone::{Axis, Body, Bounds, Drive, Joint, Linear, MassProperties, Shape, World};
@@ -90,13 +89,12 @@ pub(super) fn car(speed: f32, inside: f32) -> Scene {
     let chassis = world.add(chassis.position(0.0, 0.75, 0.0));
     let omega = TAU * RIDE.0;
     let sag = 9.81 / (omega * omega);
+    let (stiffness, damping) = (0.25 * CHASSIS * omega * omega, 0.5 * CHASSIS * omega * RIDE.1);
     for (x, z) in [(1.3, -0.9), (1.3, 0.9), (-1.3, -0.9), (-1.3, 0.9)] {
         let turned = about(Vec3::X, FRAC_PI_2);
         let wheel = Body::dynamic().named("wheel").shape(Shape::cylinder(0.12, RADIUS)).total_mass(WHEEL).friction(1.0);
         let wheel = world.add(wheel.rotation(turned).position(x, RADIUS, z));
-        let law = [0.25 * CHASSIS * omega * omega, 0.5 * CHASSIS * omega * RIDE.1];
-        let (frequency, damping_ratio) = suspension(&world.bodies[chassis], Vec3::new(x, 0.0, z), WHEEL, law);
-        let spring = Axis::limited(-0.15, 0.15).spring(-sag, frequency, damping_ratio, f32::MAX);
+        let spring = Axis::limited(-0.15, 0.15).spring_damper(-sag, stiffness, damping, f32::MAX);
         let spin = if x < 0.0 { Axis::FREE.motor(-speed / RADIUS, 800.0) } else { Axis::FREE };
         let place = Vec3::new(x, RADIUS - 0.75, z);
         let joint = |body: usize| Joint::new(body, Vec3::ZERO, chassis, place).along(Vec3::Z);

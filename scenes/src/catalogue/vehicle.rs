@@ -23,19 +23,6 @@ const RIDE: (f32, f32) = (1.5, 0.4);
 const HALF: f32 = 100.0;
 const CELLS: usize = 100;
 
-/// Frequency (Hz) and damping ratio of an axis along Y between a chassis and a wheel of `wheel` kg at `arm`, for a
-/// stiffness (N/m) and a damping (N s/m): frequency and damping ratio refer to the mass that the spring moves, which is
-/// mainly the wheel.
-pub(super) fn suspension(chassis: &Body, arm: Vec3, wheel: f32, [stiffness, damping]: [f32; 2]) -> (f32, f32) {
-    let corner = 1.0 / chassis.mass.mass + {
-        let about = arm.cross(Vec3::Y);
-        about.dot(chassis.mass.world_inverse_inertia(chassis.rotation) * about)
-    };
-    let moved = 1.0 / (1.0 / wheel + corner);
-    let own = (stiffness / moved).sqrt();
-    (own / TAU, damping / (2.0 * moved * own))
-}
-
 /// A vehicle that drives along x at `speed` (m/s), steered by `degrees` to the left, with `load` kg on its chassis, on
 /// hills of the height `hills` (m), with the friction `mu`.
 pub(super) fn vehicle(speed: f32, degrees: f32, hills: f32, load: f32, mu: f32) -> Result<Scene> {
@@ -51,13 +38,12 @@ pub(super) fn vehicle(speed: f32, degrees: f32, hills: f32, load: f32, mu: f32) 
     let chassis = driven.index();
     let omega = TAU * RIDE.0;
     let sag = 9.81 / (omega * omega);
-    let law = [0.25 * CHASSIS * omega * omega, 0.5 * CHASSIS * omega * RIDE.1];
+    let (stiffness, damping) = (0.25 * CHASSIS * omega * omega, 0.5 * CHASSIS * omega * RIDE.1);
     let turned = about(Vec3::X, FRAC_PI_2);
     for (x, z) in PLACES {
         let wheel = Body::dynamic().named("wheel").shape(Shape::cylinder(0.12, RADIUS)).total_mass(WHEEL).friction(mu);
         let wheel = world.add(wheel.rotation(turned).position(x, RADIUS, z));
-        let (frequency, damping_ratio) = suspension(&world.bodies[chassis], Vec3::new(x, 0.0, z), WHEEL, law);
-        let spring = Axis::limited(-0.25, 0.25).spring(-sag, frequency, damping_ratio, f32::MAX);
+        let spring = Axis::limited(-0.25, 0.25).spring_damper(-sag, stiffness, damping, f32::MAX);
         let (angle, spin) = turn.of_wheel((x, z));
         let steer = if x > 0.0 { Axis::limited(angle, angle) } else { Axis::LOCKED };
         let place = Vec3::new(x, RADIUS - HEIGHT, z);
