@@ -9,7 +9,7 @@ use super::{Character, Ground};
 use crate::collide::{Clearance, clearances};
 use crate::math::rotation::{about, product, unit};
 use crate::queries::{Filter, Hit, Queries};
-use crate::world::{Body, BodyHandle, BodyKind, Collider, World, placed, pose};
+use crate::world::{Body, BodyHandle, BodyKind, Collider, Shape, World, placed, pose};
 
 /// Distance at which the character touches, relative to its margin.
 const NEAR: f32 = 1.25;
@@ -188,15 +188,42 @@ impl<'a> Surroundings<'a> {
                     placed(frame, pose(collider.position, collider.rotation))
                 };
                 let stood = if self.moves(body) { moved() } else { stood };
-                clearances((&collider.shape, &stood), (&own.shape, &own_pose), within, self.up, &mut |clearance| {
+                let tell = &mut |clearance| {
                     let Clearance { normal, distance, point, upright } = clearance;
                     let hit = Hit { body, collider: index, distance, point, normal };
                     touches.push(Touch { hit, upright, is_near: distance <= NEAR * self.margin });
-                });
+                };
+                let beside = &mut |at: Vec3, around: f32, with: &mut dyn FnMut(&Shape, Pose)| {
+                    self.each_beside((body, index), at, around, with);
+                };
+                clearances((&collider.shape, &stood), (&own.shape, &own_pose), within, self.up, beside, tell);
             });
         }
         touches.sort_by_key(|touch| (touch.hit.body, touch.hit.collider));
         touches
+    }
+
+    /// Calls `with` on the fixed colliders near a point beside a fixed collider, sorted by index.
+    fn each_beside(
+        &self,
+        (body, index): (BodyHandle, usize),
+        at: Vec3,
+        around: f32,
+        with: &mut dyn FnMut(&Shape, Pose),
+    ) {
+        let is_fixed = |body: BodyHandle| self.world.bodies[body.index()].kind == BodyKind::Fixed;
+        if !is_fixed(body) {
+            return;
+        }
+        let mut near = Vec::new();
+        let bounds = (at - Vec3::splat(around), at + Vec3::splat(around));
+        self.queries.near(&self.filter, bounds, |other, k, collider, stood| {
+            if (other, k) != (body, index) && Some(other) != self.without && is_fixed(other) {
+                near.push((other, k, collider.shape.clone(), stood));
+            }
+        });
+        near.sort_by_key(|&(other, k, ..)| (other, k));
+        near.iter().for_each(|(.., shape, stood)| with(shape, *stood));
     }
 
     /// Whether a contact carries the character at a position.

@@ -7,7 +7,8 @@ use parry3d::math::Pose;
 use parry3d::shape::Triangle;
 
 use super::facet::composite_contacts;
-use super::query::convex_contact;
+use super::query::{TRUE, convex_contact};
+use super::rim::{self, Beside};
 use super::solid::{ClipBuffers, ContactQuery, EXACT, ParryManifold, Solid};
 use crate::world::{Shape, seen_from};
 
@@ -29,13 +30,18 @@ thread_local! {
     static SCRATCH: RefCell<(ClipBuffers, Vec<ParryManifold>)> = RefCell::default();
 }
 
+/// Calls a function on the shapes that lie within a distance (m) of a point of the world, and on their poses.
+pub(crate) type EachBeside<'a> = &'a mut dyn FnMut(Vec3, f32, &mut dyn FnMut(&Shape, Pose));
+
 /// Calls `with` for each convex part of a shape (the whole of a convex one, each triangle of a mesh or height field)
-/// that is nearer than `within` (m) to a convex shape `moving`. The mesh determines the order of triangles.
+/// that is nearer than `within` (m) to a convex shape `moving`. The mesh determines the order of triangles. `beside`
+/// finds the shapes that go on from free edges.
 pub(crate) fn clearances(
     (fixed, pose): (&Shape, &Pose),
     (moving, own): (&Shape, &Pose),
     within: f32,
     up: Vec3,
+    beside: EachBeside,
     with: &mut dyn FnMut(Clearance),
 ) {
     let Some(mover) = Solid::or_point(&*moving.0, *own) else { return };
@@ -60,7 +66,16 @@ pub(crate) fn clearances(
     SCRATCH.with_borrow_mut(|(buffers, many)| {
         let Some(other) = Solid::or_point(&*fixed.0, *pose) else {
             many.clear();
-            composite_contacts(&*fixed.0, &*moving.0, &pos12, search, buffers, many);
+            let around = TRUE * size;
+            let mut goes_on = |[p, out]: [Vec3; 2], normals: &mut Vec<Vec3>| {
+                let mut is_found = false;
+                beside(*pose * p, around, &mut |other, stood| {
+                    is_found |= rim::goes_on((&*other.0, seen_from(*pose, stood)), [p, out], around, normals);
+                });
+                is_found
+            };
+            let beside = &mut Beside { around, goes_on: &mut goes_on };
+            composite_contacts(&*fixed.0, &*moving.0, &pos12, search, beside, buffers, many);
             for found in many.iter() {
                 let Some(triangle) = triangle_of(fixed, found.subshape1) else { continue };
                 let corners = triangle.vertices().map(|corner| *pose * corner);

@@ -47,13 +47,40 @@ impl FacetCone {
         let [a, b, c] = edges.map(|edge| 2.0 * face.dot(edge) * edge - face);
         Self { face: *face, directions: [*face, a, b, c] }
     }
+
+    /// Whether a direction points out of the front of the triangle, or along its plane.
+    pub fn is_in_front(&self, d: Vec3) -> bool {
+        d.dot(self.face) >= -ROUNDING
+    }
+
+    /// Whether the cone can be opened to a direction: one in front, other than the normal of the triangle.
+    pub fn opens(&self, d: Vec3) -> bool {
+        self.is_in_front(d) && !Self::is_same(self.face, d)
+    }
+
+    /// Whether two directions are equal except for rounding.
+    pub fn is_same(d: Vec3, e: Vec3) -> bool {
+        d.dot(e) > 1.0 - ROUNDING
+    }
+
+    /// The direction nearest to `d` in the cone and some more directions, which are added to the list.
+    pub fn nearest(&self, more: &mut Vec<Vec3>, d: Vec3) -> Vec3 {
+        more.extend(self.directions);
+        let normal = self.or_face(more, d);
+        // Rounding alone must not turn the direction of a distance.
+        if Self::is_same(normal, d) { d } else { normal }
+    }
+
+    fn or_face(&self, directions: &[Vec3], d: Vec3) -> Vec3 {
+        // Among normals that are all perpendicular to the direction, rounding alone would choose.
+        nearest(directions, d).filter(|normal| normal.dot(d) > ACROSS).unwrap_or(self.face)
+    }
 }
 
 impl NormalConstraints for FacetCone {
     fn project_local_normal_mut(&self, d: &mut Vec3) -> bool {
         let is_in_front = d.dot(self.face) >= 0.0;
-        // Among normals that are all perpendicular to the direction, rounding alone would choose.
-        *d = nearest(&self.directions, *d).filter(|normal| normal.dot(*d) > ACROSS).unwrap_or(self.face);
+        *d = self.or_face(&self.directions, *d);
         is_in_front
     }
 }
@@ -74,8 +101,8 @@ mod tests {
         assert_eq!(nearest(&[], Vec3::X), None);
     }
 
-    /// At the outer edge of a field the normal points sideways. Inner edges have no such normal: a direction along the
-    /// field is turned up.
+    /// At a steep neighbor the normal points sideways. Other edges have no such normal: a direction along the triangle
+    /// is turned up.
     #[test]
     fn an_edge_aside_lets_no_direction_along_the_triangle_pass() {
         let edges = [Vec3::Y, Vec3::new(0.0, 1.0, -1.0).normalize(), Vec3::Y];

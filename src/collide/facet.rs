@@ -8,14 +8,15 @@
 use glam::Vec3;
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
-use parry3d::query::TrackedContact;
 use parry3d::query::details::{NormalConstraints, contact_support_map_support_map_with_params};
 use parry3d::query::gjk::{GJKResult, VoronoiSimplex};
+use parry3d::query::{PointQuery, TrackedContact};
 use parry3d::shape::{PackedFeatureId, Shape, SupportMap, Triangle, TrianglePseudoNormals};
 
 use super::cone::FacetCone;
+use super::rim::{Beside, Facet, RimScratch, each_triangle};
 use super::solid::{
-    ClipBuffers, ContactQuery, DEEP, EXACT, Magnified, PUSH, ParryManifold, Patch, Solid, add_above, ask, clip,
+    ClipBuffers, ContactQuery, Corner, DEEP, EXACT, Magnified, PUSH, ParryManifold, Patch, Solid, add_above, ask, clip,
     clip_to, magnification,
 };
 
@@ -45,50 +46,79 @@ pub(super) fn composite_contacts(
     shape: &dyn Shape,
     pos12: &Pose,
     search: ContactQuery,
+    beside: &mut Beside,
     buffers: &mut ClipBuffers,
     many: &mut Vec<ParryManifold>,
 ) {
     let around = shape.compute_aabb(pos12).loosened(search.prediction);
     // In the frame of the shape's middle, numbers are as small as the shape.
+    let middle = pos12.translation;
     let convex = Solid::new(shape, Pose::from_parts(Vec3::ZERO, pos12.rotation));
-    let near = Aabb::new(around.mins - pos12.translation, around.maxs - pos12.translation).loosened(search.size);
-    let mut with = |i: u32, triangle: &Triangle, cone: &dyn Fn() -> Option<TrianglePseudoNormals>| {
-        let mut found = ParryManifold::with_data(i, 0, ());
+    let near = Aabb::new(around.mins - middle, around.maxs - middle).loosened(search.size);
+    each_triangle(composite, &around, |facet, triangle| {
+        let mut found = ParryManifold::with_data(facet.number, 0, ());
         if let Some(convex) = &convex {
-            let corners = triangle.vertices().map(|corner| corner - pos12.translation);
-            if triangle_contact(corners, cone, convex, &near, search, buffers, &mut found).is_some() {
-                found.points.iter_mut().for_each(|point| point.local_p1 += pos12.translation);
+            let corners = triangle.vertices().map(|corner| corner - middle);
+            let mut open = |cone: &FacetCone, points: &[Corner], d: Vec3, rim: &mut RimScratch| {
+                beside.open(composite, cone, points.iter().map(|point| point.0 + middle), d, rim)
+            };
+            let sides = || Some(Sides { cone: facet.cone()?, is_free: facet.free_edges().contains(&true) });
+            if triangle_contact(corners, (&sides, &mut open), convex, &near, search, buffers, &mut found).is_some() {
+                found.points.iter_mut().for_each(|point| point.local_p1 += middle);
             }
         } else {
-            let cone = cone();
+            let cone = facet.cone();
             let cone = cone.as_ref().map(FacetCone::new);
-            let cone = cone.as_ref().map(|cone| cone as &dyn NormalConstraints);
+            let is_open = cone.as_ref().is_some_and(|cone| ball_opens(facet, triangle, cone, middle, beside, buffers));
+            let cone = cone.as_ref().filter(|_| !is_open).map(|cone| cone as &dyn NormalConstraints);
             ask((triangle, shape), pos12, cone, search, &mut found);
         }
         if !found.points.is_empty() {
             many.push(found);
         }
-    };
-    if let Some(mesh) = composite.as_trimesh() {
-        let triangles = mesh.bvh().intersect_aabb(&around).filter(|&i| (i as usize) < mesh.num_triangles());
-        triangles.for_each(|i| with(i, &mesh.triangle(i), &|| mesh.triangle_normal_constraints(i)));
-    } else if let Some(field) = composite.as_heightfield() {
-        field.map_elements_in_local_aabb(&around, &mut |i, triangle| {
-            with(i, triangle, &|| field.triangle_normal_constraints(i));
-        });
-    }
+    });
 }
 
+/// Whether a ball at `center` may touch a triangle along the line from its nearest point, which the closed cone turns.
+fn ball_opens(
+    facet: Facet,
+    triangle: &Triangle,
+    cone: &FacetCone,
+    center: Vec3,
+    beside: &mut Beside,
+    ClipBuffers { rim, .. }: &mut ClipBuffers,
+) -> bool {
+    let on = triangle.project_local_point(center, false).point;
+    let Some(d) = (center - on).try_normalize() else { return false };
+    let mut turned = d;
+    cone.project_local_normal_mut(&mut turned)
+        && turned != d
+        && facet.free_edges().contains(&true)
+        && beside.open(facet.composite, cone, [on], d, rim) == Some(d)
+}
+
+/// The normals of a triangle with one side.
+pub(super) struct Sides {
+    /// Those of the triangle and its neighbors, without the directions out of free edges.
+    pub cone: TrianglePseudoNormals,
+    /// Whether one of its edges is free.
+    pub is_free: bool,
+}
+
+/// Finds the normal nearest to a direction at some points of a triangle. Returns `None` if nothing opens its cone
+/// there.
+pub(super) type Open<'a> = &'a mut dyn FnMut(&FacetCone, &[Corner], Vec3, &mut RimScratch) -> Option<Vec3>;
+
 /// The contact of a triangle with a convex shape that is nearer than `prediction` and on the front of the triangle.
-/// Only geometry within the box `near` counts. Normals stay within `cone`, so bodies do not catch on edges between
-/// triangles. Without a cone the triangle has two sides.
+/// Only geometry within the box `near` counts. Normals stay within the cone of its sides, so bodies do not catch on
+/// edges between triangles. Without sides the triangle has two. `open` adds normals at free edges.
 pub(super) fn triangle_contact(
     [a, mut b, mut c]: [Vec3; 3],
-    cone: &dyn Fn() -> Option<TrianglePseudoNormals>,
+    (sides, open): (&dyn Fn() -> Option<Sides>, Open),
     convex: &Solid,
     near: &Aabb,
     ContactQuery { prediction, size }: ContactQuery,
-    ClipBuffers { polygon, unclipped, patch, corners }: &mut ClipBuffers,
+    ClipBuffers { polygon, unclipped, patch, corners, rim }: &mut ClipBuffers,
     found: &mut ParryManifold,
 ) -> Option<()> {
     let mut face = (b - a).cross(c - a).try_normalize()?;
@@ -97,12 +127,14 @@ pub(super) fn triangle_contact(
     if above.max(below) > prediction {
         return None;
     }
-    let cone = cone();
-    if cone.is_none() && below > above {
+    let sides = sides();
+    if sides.is_none() && below > above {
         std::mem::swap(&mut b, &mut c);
         (face, above, below) = (-face, below, above);
     }
-    let is_flat = cone.as_ref().is_some_and(|cone| cone.edges.iter().all(|edge| edge.dot(cone.face) > 0.999_999));
+    let is_flat =
+        |sides: &Sides| !sides.is_free && sides.cone.edges.iter().all(|edge| edge.dot(sides.cone.face) > 0.999_999);
+    let is_flat = sides.as_ref().is_some_and(is_flat);
     let base = [a, b, c].map(|at| (at, 0));
     convex.feature(-face, polygon);
     clip_to(polygon, unclipped, &base, face);
@@ -177,8 +209,30 @@ pub(super) fn triangle_contact(
         return None;
     }
     let mut normal = direction;
-    if cone.is_some_and(|cone| !FacetCone::new(&cone).project_local_normal_mut(&mut normal)) {
-        return None;
+    if let Some(Sides { cone, is_free }) = sides {
+        let cone = FacetCone::new(&cone);
+        let is_in_front = cone.project_local_normal_mut(&mut normal);
+        let opens = is_free && cone.is_in_front(direction) && !FacetCone::is_same(normal, direction);
+        let opened = opens.then(|| {
+            corners.clear();
+            if let Some((_, on_patch, ..)) = closest.filter(|closest| closest.0 == direction) {
+                corners.push((on_patch, 0));
+            } else {
+                convex.feature(-direction, corners);
+                let least = direction.dot(convex.furthest(-direction));
+                corners.retain(|corner| direction.dot(corner.0) <= least + EXACT * size);
+                let triangle = Triangle::new(a, b, c);
+                let to_edge = direction * (distance + convex.radius);
+                let on = |at: Vec3| triangle.project_local_point(at - to_edge, false).point;
+                corners.iter_mut().for_each(|corner| corner.0 = on(corner.0));
+            }
+            open(&cone, corners, direction, rim)
+        });
+        match opened.flatten() {
+            Some(turned) => normal = turned,
+            None if !is_in_front => return None,
+            None => {}
+        }
     }
     if normal != face {
         convex.feature(-normal, polygon);

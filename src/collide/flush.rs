@@ -8,11 +8,14 @@
 use glam::Vec3;
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Pose;
+use parry3d::query::PointQuery;
+use parry3d::shape::{SupportMap, Triangle};
 
 use super::collider::ColliderInfo;
 use super::cone::nearest;
 use super::pair::{Side, pose};
 use super::query::{TRUE, flip, flush_contact};
+use super::rim::{each_triangle, goes_on};
 use super::solid::{ClipBuffers, ContactQuery, EXACT, ParryManifold, Solid};
 use super::tree::Tree;
 use super::world_contacts::{DetectionInput, Plane, key};
@@ -41,7 +44,7 @@ pub(super) struct Neighbors<'a> {
 /// Reusable memory of one thread.
 #[derive(Default)]
 pub(super) struct FlushScratch {
-    near: Vec<u32>,
+    pub near: Vec<u32>,
     faces: Vec<Face>,
     directions: Vec<Vec3>,
 }
@@ -72,18 +75,39 @@ impl Flush<'_> {
         self.collider.shape.distance_to_local_point(self.pose.inverse_transform_point(p), true) <= exact
     }
 
-    /// Its extent beyond the plane through `p` with the unit normal `n`, and its distance from `p` (m).
-    fn beyond(&self, n: Vec3, p: Vec3, size: f32) -> (f32, f32) {
+    /// Calls `with` on the triangles at a point, if it is a mesh or height field.
+    fn each_triangle(&self, (p, around): (Vec3, f32), mut with: impl FnMut(&Triangle)) {
+        let p = self.pose.inverse_transform_point(p);
+        each_triangle(&*self.collider.shape, &Aabb::from_half_extents(p, Vec3::splat(around)), |_, triangle| {
+            if triangle.distance_to_local_point(p, true) <= around {
+                with(triangle);
+            }
+        });
+    }
+
+    /// Its extent beyond the plane through `top` with the unit normal `n`, and its distance from `top` (m). Of a mesh
+    /// or height field, only the triangles at a point count.
+    fn beyond(&self, n: Vec3, top: Vec3, at: (Vec3, f32), size: f32) -> (f32, f32) {
         let own = self.pose.rotation.inverse() * n;
         if let Some(plane) = self.collider.shape.as_halfspace() {
             return (size * own.distance(plane.normal), size);
         }
-        let Some(map) = self.collider.shape.as_support_map() else { return (0.0, 0.0) };
-        let away = self.pose * map.local_support_point(own) - p;
-        (n.dot(away), away.length())
+        let beyond = |map: &dyn SupportMap| {
+            let away = self.pose * map.local_support_point(own) - top;
+            (n.dot(away), away.length())
+        };
+        if let Some(map) = self.collider.shape.as_support_map() {
+            return beyond(map);
+        }
+        let mut furthest = (0.0, 0.0);
+        self.each_triangle(at, |triangle| {
+            let one = beyond(triangle);
+            furthest = if one.0 > furthest.0 { one } else { furthest };
+        });
+        furthest
     }
 
-    fn each_face(&self, faces: &mut Vec<Face>) {
+    fn each_face(&self, at: (Vec3, f32), faces: &mut Vec<Face>) {
         let mut add = |normal: Vec3| {
             let normal = self.pose.rotation * normal;
             if faces.iter().all(|face| !face.is_as(normal)) {
@@ -94,6 +118,8 @@ impl Flush<'_> {
             add(plane.normal);
         } else if let Some(solid) = Solid::new(&*self.collider.shape, Pose::IDENTITY) {
             solid.each_normal(add);
+        } else {
+            self.each_triangle(at, |triangle| triangle.normal().into_iter().for_each(&mut add));
         }
     }
 }
@@ -142,6 +168,35 @@ impl Neighbors<'_> {
         kinds[other as usize] == BodyKind::Fixed && meets() && !jointed.contains(&key(body, other))
     }
 
+    /// Distance up to which a collider lies flush with others (m).
+    pub fn flush_distance(own: Pose, size: f32) -> f32 {
+        (TRUE * size).max(ROUNDING * own.translation.abs().max_element())
+    }
+
+    /// Whether another shape lies flush with the first of two colliders at a point, and goes on from there in a
+    /// direction. Adds the normals of the triangles there. All are in the frame of the first collider, at `own_pose`.
+    pub fn go_on(
+        &self,
+        [own, other]: [u32; 2],
+        own_pose: Pose,
+        [p, out]: [Vec3; 2],
+        size: f32,
+        (near, normals): (&mut Vec<u32>, &mut Vec<Vec3>),
+    ) -> bool {
+        if !self.may_lie_flush(own) {
+            return false;
+        }
+        let around = Self::flush_distance(own_pose, size);
+        self.find_near([own, other], own_pose * p, around, near);
+        let mut is_found = false;
+        for &c in &*near {
+            let collider = &self.colliders[c as usize];
+            let seen = seen_from(own_pose, pose((collider, &self.input.moving[collider.body as usize])));
+            is_found |= goes_on((&*collider.shape, seen), [p, out], around, normals);
+        }
+        is_found
+    }
+
     /// Whether other colliders can keep their poses relative to this one: true for the colliders of a body that
     /// contacts cannot push.
     fn may_lie_flush(&self, own: u32) -> bool {
@@ -181,10 +236,10 @@ impl Neighbors<'_> {
             if point.dist > nearest_dist + around {
                 continue;
             }
-            self.find_near(of, of.pose * p, around, near);
+            self.find_near([of.own, of.other], of.pose * p, around, near);
             near.retain(|c| flush(c).holds(p, around));
             let is_behind = |c: &u32| {
-                let (beyond, distance) = flush(c).beyond(n, p, size);
+                let (beyond, distance) = flush(c).beyond(n, p, (p, around), size);
                 beyond <= SAME * (distance + 0.1 * size)
             };
             if near.iter().all(is_behind) {
@@ -192,12 +247,12 @@ impl Neighbors<'_> {
             }
             faces.clear();
             solid.each_normal(|normal| faces.push(Face { normal, is_own: true }));
-            near.iter().for_each(|c| flush(c).each_face(faces));
+            near.iter().for_each(|c| flush(c).each_face((p, around), faces));
             // Points that parry finds on an edge lie beside it by more than the tolerance of flush faces.
             faces.retain(|face| {
                 let d = face.normal;
                 let top = solid.furthest(d);
-                d.dot(top - p) <= around && near.iter().all(|c| flush(c).beyond(d, top, size).0 <= exact)
+                d.dot(top - p) <= around && near.iter().all(|c| flush(c).beyond(d, top, (p, around), size).0 <= exact)
             });
             let mut consider = |face: Face| {
                 let d = face.normal;
@@ -227,7 +282,7 @@ impl Neighbors<'_> {
 
     /// Finds colliders whose boxes contain a point of the world. They keep their poses relative to `own`, and collide
     /// with the other body.
-    fn find_near(&self, Of { own, other, .. }: Of, p: Vec3, around: f32, near: &mut Vec<u32>) {
+    fn find_near(&self, [own, other]: [u32; 2], p: Vec3, around: f32, near: &mut Vec<u32>) {
         let DetectionInput { kinds, groups, jointed, .. } = *self.input;
         let [body, guest] = [own, other].map(|c| self.colliders[c as usize].body);
         let stays = |c: u32| {

@@ -26,6 +26,7 @@ mod places;
 mod query;
 mod report;
 mod reuse;
+mod rim;
 mod sensors;
 mod solid;
 mod sweep;

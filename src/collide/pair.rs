@@ -3,7 +3,7 @@
 use glam::Vec3;
 use parry3d::math::Pose;
 use parry3d::query::TrackedContact;
-use parry3d::shape::TypedShape;
+use parry3d::shape::{Shape, TypedShape};
 
 use super::collider::{BodyState, ColliderInfo};
 use super::detector::{ColliderSide, in_order};
@@ -11,6 +11,7 @@ use super::facet::composite_contacts;
 use super::flush::{FlushScratch, Neighbors};
 use super::manifold::{MAX_POINTS, Manifold, ManifoldPoint, NO_SLOT};
 use super::query::{convex_contact, empty, flip};
+use super::rim::Beside;
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold};
 use crate::random::mixed;
 use crate::world::{Body, BodyKind, World, placed, seen_from};
@@ -172,11 +173,26 @@ impl Pair {
         let PairScratch { buffers, one, many, flush, renewal } = scratch;
         many.clear();
         self.is_mended = false;
+        let [a, b] = colliders;
+        let mut is_mended = false;
+        let mut of_composite = |own: [u32; 2], own_pose: Pose, shapes: [&dyn Shape; 2], pos12: &Pose| {
+            let mut goes_on = |at: [Vec3; 2], normals: &mut Vec<Vec3>| {
+                let goes_on = |all: &Neighbors| all.go_on(own, own_pose, at, self.size, (&mut flush.near, normals));
+                let is_covered = neighbors.is_some_and(goes_on);
+                is_mended |= is_covered;
+                is_covered
+            };
+            let around = Neighbors::flush_distance(own_pose, self.size);
+            let beside = &mut Beside { around, goes_on: &mut goes_on };
+            composite_contacts(shapes[0], shapes[1], pos12, search, beside, buffers, many);
+        };
         let found: &[ParryManifold] = if ca.is_composite() {
-            composite_contacts(&*ca.shape, &*cb.shape, &pos12, search, buffers, many);
+            of_composite([a, b], pose_a, [&*ca.shape, &*cb.shape], &pos12);
+            self.is_mended = is_mended;
             many
         } else if cb.is_composite() {
-            composite_contacts(&*cb.shape, &*ca.shape, &pos12.inverse(), search, buffers, many);
+            of_composite([b, a], pose_b, [&*cb.shape, &*ca.shape], &pos12.inverse());
+            self.is_mended = is_mended;
             many.iter_mut().for_each(flip);
             many
         } else {

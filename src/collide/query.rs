@@ -162,7 +162,7 @@ fn face_contact(
     search: ContactQuery,
     buffers: &mut ClipBuffers,
 ) -> ParryManifold {
-    let ClipBuffers { polygon, patch, unclipped, corners } = buffers;
+    let ClipBuffers { polygon, patch, unclipped, corners, .. } = buffers;
     solid.feature(face, patch);
     other.feature(-face, polygon);
     clip_to(polygon, unclipped, patch, face);
@@ -185,7 +185,7 @@ pub(super) fn flush_contact(
     other: &Solid,
     (normal, is_face): (Vec3, bool),
     search: ContactQuery,
-    ClipBuffers { polygon, patch, unclipped, corners }: &mut ClipBuffers,
+    ClipBuffers { polygon, patch, unclipped, corners, .. }: &mut ClipBuffers,
     found: &mut ParryManifold,
 ) {
     // Widen it a little, so that a point just between two shapes lies on one of them.

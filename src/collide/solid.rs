@@ -6,6 +6,8 @@ use parry3d::query::details::{NormalConstraints, contact_manifold_pfm_pfm};
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use parry3d::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, SupportMap, TypedShape};
 
+use super::rim::RimScratch;
+
 /// parry's manifold, without data of drystone.
 pub(super) type ParryManifold = ContactManifold<(), ()>;
 
@@ -40,6 +42,7 @@ pub(super) struct ClipBuffers {
     pub patch: Vec<Corner>,
     pub unclipped: Vec<Corner>,
     pub corners: Vec<Corner>,
+    pub rim: RimScratch,
 }
 
 /// Keeps the part of `polygon` with n · x <= `limit`. New corners are numbered by their edge and by `cut`.

@@ -208,10 +208,11 @@ impl<'a> Queries<'a> {
         if let Some((own, (lower, upper))) = placed(shape, position, rotation).filter(|_| within.is_finite()) {
             let bounds = (lower - within, upper + within);
             self.near(filter, bounds, |body, index, collider, pose| {
-                clearances((&collider.shape, &pose), (shape, &own), within, Vec3::ZERO, &mut |clearance| {
+                let tell = &mut |clearance| {
                     let Clearance { normal, distance, point, .. } = clearance;
                     contacts.push(Hit { body, collider: index, distance, point, normal });
-                });
+                };
+                clearances((&collider.shape, &pose), (shape, &own), within, Vec3::ZERO, &mut |_, _, _| {}, tell);
             });
         }
         contacts.sort_by_key(|hit| (hit.body, hit.collider));

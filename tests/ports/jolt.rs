@@ -1577,7 +1577,6 @@ fn rays_from_above_find_the_samples_of_a_field() {
 
 /// Jolt, ConvexVsTrianglesTest: TestSphereVsTriangles, TestConvexVsTriangles, with active edges.
 #[test]
-#[ignore = "no contact if the middle of the ball is beyond a free edge: a ball falls past the edge of a mesh"]
 fn a_ball_meets_the_face_the_edges_and_the_corners_of_a_triangle() {
     let corners = [Vec3::ZERO, vec3(0.0, 0.0, 10.0), vec3(10.0, 0.0, 0.0)];
     let mut world = World::new();
