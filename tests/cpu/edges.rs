@@ -409,7 +409,7 @@ fn deepest_at_rim(tiles: &[Tile], body: Body, shape: &Shape) -> (f32, Vec3) {
     (deepest, simulation.world.bodies[body].position)
 }
 
-/// What rolls or tips over the end of a plate follows it.
+/// Bodies that roll or tip over the end of a plate follow it.
 #[test]
 fn the_rim_of_a_plate_is_as_hard_as_its_face() {
     let across = Quat::from_rotation_x(FRAC_PI_2);
