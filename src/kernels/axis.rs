@@ -95,7 +95,7 @@ fn apply_axis_impulse<L: Lane>(pair: &mut Pair<L>, motion: &AxisMotion<L>, p: L)
 /// The least movement of bodies with locked axes, relative to that of free ones: 2^-20.
 const MIN_MOVED: f64 = 9.536_743_164_062_5e-7;
 
-/// The speed that a unit impulse along the axis gives. Bodies with locked axes move by [`MIN_MOVED`] of those without
+/// The speed that a unit impulse along the axis gives. Bodies with locked axes move by `MIN_MOVED` of those without
 /// at least.
 #[inline(always)]
 pub fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
