@@ -109,7 +109,8 @@ pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rat
             (false, _, Bounds::Between { min, max }) => 0.5 * (min + max),
             _ => 0.0,
         };
-        let position = if i < 3 { motion.position[i] } else { nearest(motion.position[i], middle) };
+        let is_counted = i < 3 || i == 3 && axis.counts_turns();
+        let position = if is_counted { motion.position[i] } else { nearest(motion.position[i], middle) };
         let row = AxisRow {
             direction: motion.direction[i].to_array(),
             is_linear: if i < 3 { 1.0 } else { 0.0 },

@@ -31,6 +31,8 @@ pub struct JointRows {
     is_colored: bool,
     /// The length of the substeps of each impulse, over that of class 0; 0 without an impulse.
     shares: Vec<f32>,
+    /// The first angle of each joint that counts turns, in the last step (rad).
+    twists: Vec<Option<f32>>,
     /// The system of each joint that is solved directly; `SWEPT` for the others.
     systems: Vec<u32>,
     /// The length of a substep that the systems were chosen for; `None` before the choice.
@@ -55,6 +57,7 @@ crate::saved::state!(JointRows {
     coloring,
     is_colored,
     shares,
+    twists,
     systems,
     chosen_for,
     gravity,
@@ -110,10 +113,10 @@ impl JointRows {
     /// Refuses rows with indices beyond the bodies, joints or systems.
     pub(crate) fn check(&self, bodies: usize, problem: &StepProblem) -> Result<()> {
         let count = self.joints.len();
-        let lengths = [self.handles.len(), self.edges.len(), self.shares.len()];
+        let lengths = [self.handles.len(), self.edges.len(), self.shares.len(), self.twists.len()];
         // The impulses of axes come after those of joints.
         let impulses = problem.joint_impulses.len();
-        ensure(lengths == [count; 3] && impulses >= count, || {
+        ensure(lengths == [count; 4] && impulses >= count, || {
             format!("{lengths:?}, {impulses} rows of {count} joints")
         })?;
         let is_body = |&body: &u32| body == IMMOVABLE || (body as usize) < bodies;
@@ -279,6 +282,7 @@ impl JointRows {
             problem.joint_impulses.extend((0..axes::kinds(joint).count()).map(axis));
         }
         self.shares = from.iter().map(|from| from.map_or(0.0, |i| self.shares[i])).collect();
+        self.twists = from.iter().map(|from| from.and_then(|i| self.twists[i])).collect();
         let mut ended = vec![true; before.len()];
         from.iter().flatten().for_each(|&i| ended[i] = false);
         let changed = now.iter().zip(&from).filter(|(joint, from)| from.is_none_or(|i| before[i] != **joint));
@@ -396,9 +400,9 @@ impl JointRows {
         }
         let world_row = world.bodies.len() as u32;
         let (impulses, axis_impulses) = problem.joint_impulses.split_at_mut(world.joints.len());
-        let rows = world.joints.iter().zip(impulses).zip(&mut self.shares);
+        let rows = world.joints.iter().zip(impulses).zip(&mut self.shares).zip(&mut self.twists);
         let axes = &mut problem.axes;
-        problem.joints.extend(rows.map(|((joint, impulse), share_before)| {
+        problem.joints.extend(rows.map(|(((joint, impulse), share_before), twist)| {
             let (body_a, body_b) = joint.indices();
             let [anchor_a, mut anchor_b] = world.anchors(joint);
             let arm = |body: usize, anchor: Vec3| (anchor - world.bodies[body].center_of_mass()).to_array();
@@ -411,7 +415,11 @@ impl JointRows {
             let first_axis = axes.len();
             if !joint.is_ball() {
                 let limit_rate = Substep::new(config, substep * share).joint.bias_rate;
-                axes::write(joint, &world.joint_motion(joint), substep * share, limit_rate, axes);
+                let mut motion = world.joint_motion(joint);
+                let [first, ..] = &joint.angular;
+                *twist = first.counts_turns().then(|| first.counted(motion.position[3], *twist));
+                motion.position[3] = twist.unwrap_or(motion.position[3]);
+                axes::write(joint, &motion, substep * share, limit_rate, axes);
                 if before != share && before > 0.0 {
                     for impulse in &mut axis_impulses[first_axis..axes.len()] {
                         impulse.linear[0] *= share / before;

@@ -1,5 +1,7 @@
 //! One axis of a joint: its bounds and its drive.
 
+use std::f32::consts::{PI, TAU};
+
 use crate::error::{Result, input};
 use crate::saved::{Archive, Saved};
 
@@ -36,11 +38,12 @@ pub enum Bounds {
     Free,
     /// Only zero.
     Locked,
-    /// Any position between two limits, which can be equal. Angles range from -pi to pi: a joint does not count turns.
+    /// Any position between two limits, which can be equal. The first angle of a joint counts turns if one of its limits
+    /// is half a turn or more; other angles range from -pi to pi.
     Between {
-        /// The lower limit (m, rad). A translation or a distance can have -infinity for no lower limit.
+        /// The lower limit (m, rad). A translation, a distance or a first angle can have -infinity for no lower limit.
         min: f32,
-        /// The upper limit (m, rad). A translation or a distance can have infinity for no upper limit.
+        /// The upper limit (m, rad). A translation, a distance or a first angle can have infinity for no upper limit.
         max: f32,
     },
 }
@@ -104,6 +107,21 @@ impl Axis {
     /// Free between two limits: see [`Bounds::Between`].
     pub const fn limited(min: f32, max: f32) -> Self {
         Self { bounds: Bounds::Between { min, max }, drive: Drive::None }
+    }
+
+    /// Whether an angle counts turns: one of its limits is half a turn or more.
+    pub(crate) fn counts_turns(&self) -> bool {
+        matches!(self.bounds, Bounds::Between { min, max } if min <= -PI || max >= PI)
+    }
+
+    /// A counted angle (rad): `angle`, from -pi to pi, plus the whole turns that bring it next to the angle of the last
+    /// step, or to the middle of its limits without one.
+    pub(crate) fn counted(&self, angle: f32, before: Option<f32>) -> f32 {
+        let middle = match self.bounds {
+            Bounds::Between { min, max } if min.is_finite() && max.is_finite() => 0.5 * (min + max),
+            _ => 0.0,
+        };
+        angle + TAU * ((before.unwrap_or(middle) - angle) / TAU).round()
     }
 
     /// Adds a motor that holds `speed` (m/s, rad/s) with up to `max_load` (N, N m). With a speed of 0 the motor acts as

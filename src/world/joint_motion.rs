@@ -1,6 +1,6 @@
 //! Positions and speeds along the axes of a joint.
 
-use std::f32::consts::PI;
+use std::f32::consts::{PI, TAU};
 
 use glam::{Quat, Vec3};
 
@@ -26,9 +26,9 @@ use crate::math::rotation::{product, unit};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotion {
-    /// Positions (m), then angles (rad). The first angle is the twist about the first axis, from -pi to pi. The other
-    /// two are the components of the rotation vector that turns the first axis. The first position is the distance of
-    /// the anchors if the joint restricts the distance.
+    /// Positions (m), then angles (rad). The first angle is the twist about the first axis, from -pi to pi: a world does
+    /// not know how often a joint has turned. The other two are the components of the rotation vector that turns the
+    /// first axis. The first position is the distance of the anchors if the joint restricts the distance.
     pub position: [f32; 6],
     /// Rates of the positions and angles (m/s, rad/s).
     pub speed: [f32; 6],
@@ -40,6 +40,9 @@ pub struct JointMotion {
 
 /// The smallest value of angle cot(angle). Near pi the direction of the rotation is lost.
 const MAX_TURNED: f32 = -30.0;
+
+/// The largest limit of an angle that counts turns. Beyond it, an angle has no four digits after the point.
+const MAX_TURNS: f32 = 1000.0;
 
 /// A shorter distance than this has no direction (m).
 pub(crate) const MIN_DISTANCE: f32 = 1e-6;
@@ -164,7 +167,10 @@ impl Joint {
                 distance.check("distance", 0.0, MAX_LENGTH)?;
             }
         }
-        self.angular.iter().try_for_each(|axis| axis.check("angular", -PI, PI))
+        let [first, others @ ..] = &self.angular;
+        let most = if first.counts_turns() { MAX_TURNS * TAU } else { PI };
+        first.check("angular", -most, most)?;
+        others.iter().try_for_each(|axis| axis.check("angular", -PI, PI))
     }
 }
 
@@ -174,8 +180,7 @@ impl Axis {
             let [is_angle, ascend] = [most == PI, min <= max];
             let message = || {
                 format!(
-                    "{name}: limits {min} and {max}: must be within -pi and pi, as a joint counts no turns: leave the axis free, count turns and \
-                     stop it by motor(0.0, max_load)"
+                    "{name}: limits {min} and {max}: must be within -pi and pi: only the first angle of a joint counts turns"
                 )
             };
             ensure(!(is_angle && ascend) || least <= min && max <= most, message)?;

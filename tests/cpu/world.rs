@@ -145,8 +145,11 @@ fn what_cannot_be_simulated_is_refused_by_name() {
         ("joint 0: linear: limits 0 and 2000000000: must ascend", |w| {
             _ = w.join(ball().slider(Vec3::X).limited(0.0, 2e9))
         }),
-        ("joint 0: angular: limits -inf and 1: must be within -pi and pi, as a joint counts no turns", |w| {
-            w.join(ball().hinge(Vec3::X).limited(f32::NEG_INFINITY, 1.0));
+        ("joint 0: angular: limits 0 and 4: must be within -pi and pi: only the first angle", |w| {
+            w.join(ball().generic([Axis::LOCKED; 3], [Axis::FREE, Axis::limited(0.0, 4.0), Axis::FREE]));
+        }),
+        ("joint 0: angular: limits 0 and 10000: must ascend, within", |w| {
+            w.join(ball().hinge(Vec3::X).limited(0.0, 1e4));
         }),
     ];
     for (start, change) in cases {

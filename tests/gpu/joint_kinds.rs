@@ -1,6 +1,6 @@
 //! Joints of all kinds against closed forms.
 
-use std::f32::consts::{FRAC_PI_2, TAU};
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use drystone::glam::{Quat, Vec3};
 use drystone::{Axis, Body, Joint, Linear, Reference, Shape, Simulation, SolverConfig, StepProblem, World};
@@ -13,12 +13,15 @@ const DT: f32 = 1.0 / 240.0;
 tests! {
     no_gpu {
         impulses_of_axes_follow_their_joint_and_its_substeps,
+        a_saved_drum_has_counted_its_turns,
+        a_hinge_with_limits_at_half_a_turn_stops_there,
     }
     every_backend {
         a_damped_spring_loses_the_share_that_its_ratio_says,
         a_generic_joint_moves_as_the_kind_that_it_describes,
         a_joint_whose_axes_are_all_free_holds_nothing,
         a_limited_hinge_stops_at_its_limits,
+        a_drum_stops_after_the_turns_of_its_limits,
         a_motor_reaches_its_speed,
         a_rope_is_slack_and_then_holds,
         a_bead_on_a_turning_rod_flies_out_as_a_hyperbolic_cosine,
@@ -503,4 +506,57 @@ fn a_joint_whose_axes_are_all_free_holds_nothing(open: Open) {
             assert!((a - DT).abs() < 1e-4 && (b + DT).abs() < 1e-4, "{a} {b}");
         }
     }
+}
+
+/// A drum on a hinge that a motor turns at 9 rad/s.
+fn drum(limits: [f32; 2], speed: f32) -> World {
+    let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    let drum = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).total_mass(3.0));
+    world.join(
+        Joint::to_world(drum, Vec3::ZERO, Vec3::ZERO).hinge(Vec3::Y).limited(limits[0], limits[1]).motor(speed, 20.0),
+    );
+    world
+}
+
+/// Runs a drum, and follows its angle through all turns (rad).
+fn turned(simulation: &mut Simulation, seconds: f32) -> f32 {
+    let (mut all, mut before) = (0.0_f32, angle(&simulation.world));
+    steps(simulation, seconds, |_, world| {
+        let now = angle(world);
+        all += (now - before + PI).rem_euclid(TAU) - PI;
+        before = now;
+    });
+    all
+}
+
+fn a_drum_stops_after_the_turns_of_its_limits(open: Open) {
+    for (limits, speed, stop) in
+        [([-2.0, 20.0], 9.0, 20.0), ([-20.0, 2.0], -9.0, -20.0), ([-4.0, f32::INFINITY], -9.0, -4.0)]
+    {
+        let mut simulation = simulate(drum(limits, speed), open);
+        let end = turned(&mut simulation, 3.0);
+        assert!((end - stop).abs() < 1e-3, "{end}, not {stop}");
+        // Back to the other end.
+        simulation.world.joints[0].angular[0] = Axis::limited(limits[0], limits[1]).motor(-speed, 20.0);
+        let back = end + turned(&mut simulation, 3.0);
+        let other = if speed > 0.0 { limits[0] } else { limits[1].min(end + 27.0) };
+        assert!((back - other).abs() < if limits[1] > 1e3 { 0.1 } else { 1e-3 }, "{back}, not {other}");
+    }
+}
+
+fn a_hinge_with_limits_at_half_a_turn_stops_there() {
+    for (speed, stop) in [(9.0, PI), (-9.0, -PI)] {
+        let mut simulation = simulate(drum([-PI, PI], speed), || Box::new(Reference::<f32>::new()));
+        let end = turned(&mut simulation, 3.0);
+        assert!((end - stop).abs() < 1e-3, "{end}, not {stop}");
+    }
+}
+
+fn a_saved_drum_has_counted_its_turns() {
+    let open = || Box::new(Reference::<f32>::new());
+    let mut simulation = simulate(drum([-2.0, 20.0], 9.0), open);
+    let begin = turned(&mut simulation, 1.5);
+    let mut loaded = Simulation::load(&simulation.save(), open()).expect("a saved state");
+    let [end, of_loaded] = [&mut simulation, &mut loaded].map(|simulation| begin + turned(simulation, 1.5));
+    assert!((end - 20.0).abs() < 1e-3 && end == of_loaded, "{end}, {of_loaded}");
 }

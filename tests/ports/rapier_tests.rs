@@ -170,7 +170,6 @@ fn a_motor_turns_a_hinge_to_its_limits_within_half_a_turn() {
 
 /// Rapier, issue 499, and six of the ten dials of debug_angular_limits3.
 #[test]
-#[ignore = "limits beyond pi are refused: a joint does not count turns"]
 fn a_motor_turns_a_hinge_to_its_limits_beyond_half_a_turn() {
     assert_limits(&[[0.0, 270.0], [-270.0, 0.0], [-90.0, 200.0], [-350.0, 0.0], [45.0, 315.0], [135.0, 225.0]]);
 }

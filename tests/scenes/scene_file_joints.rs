@@ -153,12 +153,8 @@ fn an_impossible_axis_is_refused_in_one_line() {
     for (line, part) in [
         (refused(json!({"type": "hinge", "axis": [0, 0, 2]})), "axis = [0, 0, 2]: must be of length 1"),
         (hinge("limits", json!([1, 0])), "angular: limits 1 and 0: must ascend"),
-        (
-            hinge("limits", json!([0, 4])),
-            "angular: limits 0 and 4: must be within -pi and pi, as a joint counts no turns",
-        ),
+        (hinge("limits", json!([0, 1e4])), "angular: limits 0 and 10000: must ascend, within"),
         (hinge("limits", json!([0, 1e39])), "limits = [0, 1e39]: must be finite"),
-        (hinge("limits", json!([null, 1])), "angular: limits -inf and 1: must be within -pi and pi"),
         (hinge("limits", json!([0])), "limits: invalid length 1"),
         (hinge("motor", json!({"speed": 1, "max_load": -1})), "angular: max_load = -1: must be at least 0"),
         (hinge("spring", json!({"frequency": 0})), "angular: frequency = 0: must be above 0"),

@@ -455,7 +455,7 @@ pub enum JointKind {
     Hinge {
         /// Direction of the axis in the world, at the initial poses of the bodies; of length 1 within 0.001.
         axis: [f64; 3],
-        /// Least and largest angle (rad), -pi to pi.
+        /// Least and largest angle (rad). The joint counts turns if one of them is half a turn or more.
         #[serde(default, deserialize_with = "limits_or_null", skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<[Option<f64>; 2]>")]
         limits: Option<[f64; 2]>,
