@@ -557,9 +557,13 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
 /// of them the body has moved half a substep further, but not at the first. It is the displacement between the stored
 /// positions, so that the work of a constant force over many steps has no rounding that adds up.
 fn way(body: &Body, row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
-    let (position, rotation) = pose_after(body, row);
-    let center = position + rotation * body.mass.center;
-    center.as_dvec3() - body.center_of_mass().as_dvec3() - (v - v_0) * (0.5 * substep)
+    let [before, after] = if body.mass.center == Vec3::ZERO {
+        [body.position, body.position + Vec3::from(row.dp)]
+    } else {
+        let (position, rotation) = pose_after(body, row);
+        [body.center_of_mass(), position + rotation * body.mass.center]
+    };
+    after.as_dvec3() - before.as_dvec3() - (v - v_0) * (0.5 * substep)
 }
 
 /// The part of a body in the common motion of its island.
