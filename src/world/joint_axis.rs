@@ -115,13 +115,13 @@ impl Axis {
     }
 
     /// A counted angle (rad): `angle`, from -pi to pi, plus the whole turns that bring it next to the angle of the last
-    /// step, or to the middle of its limits without one.
+    /// step, or next to its limits without one.
     pub(crate) fn counted(&self, angle: f32, before: Option<f32>) -> f32 {
-        let middle = match self.bounds {
-            Bounds::Between { min, max } if min.is_finite() && max.is_finite() => 0.5 * (min + max),
-            _ => 0.0,
-        };
-        angle + TAU * ((before.unwrap_or(middle) - angle) / TAU).round()
+        let near = before.unwrap_or(match self.bounds {
+            Bounds::Between { min, max } => angle.max(min).min(max),
+            Bounds::Free | Bounds::Locked => angle,
+        });
+        angle + TAU * ((near - angle) / TAU).round()
     }
 
     /// Adds a motor that holds `speed` (m/s, rad/s) with up to `max_load` (N, N m). With a speed of 0 the motor acts as
