@@ -88,12 +88,14 @@ fn ball_opens(
     beside: &mut Beside,
     ClipBuffers { rim, .. }: &mut ClipBuffers,
 ) -> bool {
+    if !facet.free_edges().contains(&true) {
+        return false;
+    }
     let on = triangle.project_local_point(center, false).point;
     let Some(d) = (center - on).try_normalize() else { return false };
     let mut turned = d;
     cone.project_local_normal_mut(&mut turned)
         && turned != d
-        && facet.free_edges().contains(&true)
         && beside.open(facet.composite, cone, [on], d, rim) == Some(d)
 }
 

@@ -173,20 +173,19 @@ impl Neighbors<'_> {
         (TRUE * size).max(ROUNDING * own.translation.abs().max_element())
     }
 
-    /// Whether another shape lies flush with the first of two colliders at a point, and goes on from there in a
-    /// direction. Adds the normals of the triangles there. All are in the frame of the first collider, at `own_pose`.
+    /// Whether another shape lies flush with the first of two colliders at a point, within `around` (m), and goes on from
+    /// there in a direction. Adds the normals of the triangles there. All are in the frame of the first collider, at `own_pose`.
     pub fn go_on(
         &self,
         [own, other]: [u32; 2],
         own_pose: Pose,
         [p, out]: [Vec3; 2],
-        size: f32,
+        around: f32,
         (near, normals): (&mut Vec<u32>, &mut Vec<Vec3>),
     ) -> bool {
         if !self.may_lie_flush(own) {
             return false;
         }
-        let around = Self::flush_distance(own_pose, size);
         self.find_near([own, other], own_pose * p, around, near);
         let mut is_found = false;
         for &c in &*near {

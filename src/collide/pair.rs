@@ -172,34 +172,32 @@ impl Pair {
         let pos12 = seen_from(pose_a, pose_b);
         let PairScratch { buffers, one, many, flush, renewal } = scratch;
         many.clear();
-        self.is_mended = false;
         let [a, b] = colliders;
         let mut is_mended = false;
         let mut of_composite = |own: [u32; 2], own_pose: Pose, shapes: [&dyn Shape; 2], pos12: &Pose| {
+            let around = Neighbors::flush_distance(own_pose, self.size);
             let mut goes_on = |at: [Vec3; 2], normals: &mut Vec<Vec3>| {
-                let goes_on = |all: &Neighbors| all.go_on(own, own_pose, at, self.size, (&mut flush.near, normals));
+                let goes_on = |all: &Neighbors| all.go_on(own, own_pose, at, around, (&mut flush.near, normals));
                 let is_covered = neighbors.is_some_and(goes_on);
                 is_mended |= is_covered;
                 is_covered
             };
-            let around = Neighbors::flush_distance(own_pose, self.size);
             let beside = &mut Beside { around, goes_on: &mut goes_on };
             composite_contacts(shapes[0], shapes[1], pos12, search, beside, buffers, many);
         };
         let found: &[ParryManifold] = if ca.is_composite() {
             of_composite([a, b], pose_a, [&*ca.shape, &*cb.shape], &pos12);
-            self.is_mended = is_mended;
             many
         } else if cb.is_composite() {
             of_composite([b, a], pose_b, [&*cb.shape, &*ca.shape], &pos12.inverse());
-            self.is_mended = is_mended;
             many.iter_mut().for_each(flip);
             many
         } else {
             *one = convex_contact((&ca.shape, &cb.shape), &pos12, search, buffers);
-            self.is_mended = neighbors.is_some_and(|all| all.mend(colliders, sides, search, one, buffers, flush));
+            is_mended = neighbors.is_some_and(|all| all.mend(colliders, sides, search, one, buffers, flush));
             std::slice::from_ref(one)
         };
+        self.is_mended = is_mended;
         self.renew(found, sides, prediction, renewal)
     }
 

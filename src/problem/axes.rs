@@ -32,6 +32,11 @@ fn axes_of(joint: &Joint) -> impl Iterator<Item = (usize, &Axis)> {
     linear.iter().enumerate().chain((3..).zip(&joint.angular))
 }
 
+/// The axis of a joint with a number from [`axes_of`].
+fn axis_of(joint: &Joint, number: usize) -> &Axis {
+    axes_of(joint).find(|(i, _)| *i == number).expect("an axis with a row").1
+}
+
 /// The rows of a joint: the number of an axis, and whether the row is that of its drive. Drives come first, so that
 /// bounds win over them.
 pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
@@ -59,7 +64,7 @@ pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
             Drive::None => 0.0,
             Drive::Motor { max_load, .. } => max_load,
             Drive::Spring { target, max_load, .. } | Drive::SpringDamper { target, max_load, .. } => {
-                let [stiffness, _] = spring_constants(joint, i, axis.drive, world);
+                let [stiffness, _] = spring_constants(joint, i, world);
                 max_load.min(stiffness * (position[i] - target).abs())
             }
         };
@@ -80,8 +85,8 @@ pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {
     };
     let bounds = |are_angles: bool| {
         let rows = (0..).zip(kinds(joint)).filter(move |(_, (i, is_drive))| !is_drive && (*i >= 3) == are_angles);
-        let axis = |i: usize| axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
-        let own: Vec<(u32, bool)> = rows.filter_map(|(row, (i, _))| Some((row, is_limit(axis(i))?))).collect();
+        let own: Vec<(u32, bool)> =
+            rows.filter_map(|(row, (i, _))| Some((row, is_limit(axis_of(joint, i))?))).collect();
         NodeRow::rows_of(&own)
     };
     let shifts = if joint.holds_anchors() { NodeRow::ANCHORS } else { bounds(false) };
@@ -102,7 +107,7 @@ fn nearest(angle: f32, to: f32) -> f32 {
 pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rate: f32, rows: &mut Vec<AxisRow>) {
     let is_distance = matches!(joint.linear, Linear::Distance(_));
     for (i, is_drive) in kinds(joint) {
-        let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
+        let axis = axis_of(joint, i);
         // An angle continues beyond pi. The same angle less a turn would be another position.
         let middle = match (is_drive, axis.drive, axis.bounds) {
             (true, Drive::Spring { target, .. } | Drive::SpringDamper { target, .. }, _) => target,
@@ -154,13 +159,13 @@ fn driven(row: AxisRow, drive: Drive, position: f32, h: f32) -> AxisRow {
     }
 }
 
-/// Stiffness and damping of a spring on the axis `i` of a joint (N/m, N s/m; about an axis N m/rad, N m s/rad).
+/// Stiffness and damping of the spring on the axis `i` of a joint; 0 without a spring (N/m, N s/m; about an axis N m/rad, N m s/rad).
 ///
 /// For a spring of a frequency they belong to the mass that two free bodies have at their anchors, by the mean of its
 /// inverse over all directions, or to their reduced inertia about the axis of the joint in each. These are the same in
 /// every pose: a stiffness that followed the moved mass would make energy.
-fn spring_constants(joint: &Joint, i: usize, drive: Drive, world: &World) -> [f32; 2] {
-    let (frequency, damping_ratio) = match drive {
+fn spring_constants(joint: &Joint, i: usize, world: &World) -> [f32; 2] {
+    let (frequency, damping_ratio) = match axis_of(joint, i).drive {
         Drive::SpringDamper { stiffness, damping, .. } => return [stiffness, damping],
         Drive::Spring { frequency, damping_ratio, .. } => (frequency, damping_ratio),
         Drive::None | Drive::Motor { .. } => return [0.0; 2],
@@ -189,8 +194,7 @@ fn spring_constants(joint: &Joint, i: usize, drive: Drive, world: &World) -> [f3
 
 /// The stiffness of the drive in a row of a joint (N/m, N m/rad).
 pub fn stiffness(joint: &Joint, row: usize, world: &World) -> f32 {
-    let driven = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && axis.bounds != Bounds::Locked);
-    driven.skip(row).map(|(i, axis)| spring_constants(joint, i, axis.drive, world)[0]).next().unwrap_or(0.0)
+    kinds(joint).nth(row).map_or(0.0, |(i, _)| spring_constants(joint, i, world)[0])
 }
 
 /// Whether a joint has springs.
@@ -204,8 +208,7 @@ pub(super) fn tune(joint: &Joint, number: usize, substep: f32, world: &World, pr
     let row = problem.joints[number];
     let first = row.first_axis as usize;
     for (k, (i, _)) in (first..).zip(kinds(joint).filter(|(_, is_drive)| *is_drive)) {
-        let axis = axes_of(joint).find(|(number, _)| *number == i).expect("an axis with a row").1;
-        let [stiffness, damping] = spring_constants(joint, i, axis.drive, world);
+        let [stiffness, damping] = spring_constants(joint, i, world);
         let inverse_mass = inverse_mass_along(&row, &problem.axes[k], &problem.masses);
         let omega = (stiffness * inverse_mass).sqrt();
         if omega > 0.0 {

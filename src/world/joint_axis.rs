@@ -131,7 +131,7 @@ impl Axis {
     }
 
     /// Adds a spring and damper that pull to `target` (m, rad) with up to `max_load` (N, N m). A spring turns an angle
-    /// the shorter way around.
+    /// the shorter way around, unless the angle counts turns ([`Bounds::Between`]).
     pub const fn spring(self, target: f32, frequency: f32, damping_ratio: f32, max_load: f32) -> Self {
         Self { drive: Drive::Spring { target, frequency, damping_ratio, max_load }, ..self }
     }

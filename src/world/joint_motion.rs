@@ -41,7 +41,7 @@ pub struct JointMotion {
 /// The smallest value of angle cot(angle). Near pi the direction of the rotation is lost.
 const MAX_TURNED: f32 = -30.0;
 
-/// The largest limit of an angle that counts turns. Beyond it, an angle has no four digits after the point.
+/// The largest limit of an angle that counts turns (turns). There, an angle is rounded to 0.0005 rad.
 const MAX_TURNS: f32 = 1000.0;
 
 /// A shorter distance than this has no direction (m).
