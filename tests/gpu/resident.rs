@@ -9,7 +9,7 @@ use drystone::stages::backend::shader::WrittenContact;
 use drystone::stages::problem::carry::{Carry, Written};
 use drystone::stages::problem::{ContactRow, ConvergenceRow, MomentumRow};
 use drystone::stats::Traffic;
-use drystone::{Backend, Body, Reference, Result, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::{Backend, Body, Gpu, Reference, Result, Shape, Simulation, SolverConfig, StepProblem, World};
 use drystone_conform::compare::Difference;
 use drystone_scenes::Scene;
 
@@ -295,7 +295,11 @@ fn rows_that_are_not_there_are_refused() {
 
 /// The traffic to the device and back in each of the last steps of a scene, and the simulation.
 fn traffic_of(scene: &Scene, steps: u32, last: u32) -> (Vec<Traffic>, Simulation) {
-    let mut simulation = simulation(scene, &SolverConfig::default().without_sleep(), Box::new(gpu::own_plain()));
+    traffic_on(gpu::own_plain(), scene, steps, last)
+}
+
+fn traffic_on(gpu: Gpu, scene: &Scene, steps: u32, last: u32) -> (Vec<Traffic>, Simulation) {
+    let mut simulation = simulation(scene, &SolverConfig::default().without_sleep(), Box::new(gpu));
     let mut all: Vec<_> = (0..steps).map(|_| simulation.step(scene.dt).expect("a step").traffic).collect();
     (all.split_off((steps - last) as usize), simulation)
 }
@@ -333,10 +337,19 @@ fn a_small_world_is_one_dispatch_after_those_that_carry_its_rows() {
     assert!(simulation.plan().passes.len() > 20);
     // begin_bodies and begin_contacts; write_contacts where a manifold was computed.
     assert!((3..=4).contains(&settled[0].dispatches), "{settled:?}");
-    // Hardware runs larger worlds in one dispatch than a software adapter.
-    let too_many = if gpu::own_plain().summary().hardware { 800 } else { 400 };
-    let (settled, simulation) = traffic_of(&pile(too_many), 2, 1);
-    assert!(settled[0].dispatches > simulation.plan().passes.len());
+    // Hardware runs four times as many bodies in one dispatch as a software adapter.
+    for (as_hardware, fit, too_many) in [(false, 230, 280), (true, 1000, 1050)] {
+        if gpu::own_plain().summary().hardware && !as_hardware {
+            continue;
+        }
+        let dispatches = [fit, too_many].map(|n| {
+            let gpu = gpu::own_plain();
+            let gpu = if as_hardware { gpu.cut_as_hardware() } else { gpu };
+            let (falling, simulation) = traffic_on(gpu, &pile(n), 2, 1);
+            (falling[0].dispatches, simulation.plan().passes.len())
+        });
+        assert!(dispatches[0].0 <= 3 && dispatches[1].0 > dispatches[1].1, "{as_hardware}: {dispatches:?}");
+    }
 }
 
 fn a_falling_pile_sends_what_was_computed_and_the_order() {

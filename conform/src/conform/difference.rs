@@ -1,6 +1,7 @@
 //! Differences between the rows that two backends return for one problem.
 
 use drystone::StepProblem;
+use drystone::stages::problem::BodyRow;
 
 /// All numbers that a backend returns.
 fn numbers(problem: &StepProblem) -> Vec<f32> {
@@ -40,11 +41,19 @@ pub fn largest(a: &StepProblem, b: &StepProblem) -> f64 {
     pairs(a, b).map(apart).fold(0.0, f64::max)
 }
 
-/// The largest difference of a component of a velocity (m/s) or an angular velocity (rad/s).
-pub fn of_velocities(a: &StepProblem, b: &StepProblem) -> f64 {
+/// For each body, the largest difference of a component of its velocity (m/s) and angular velocity (rad/s); infinite for
+/// NaN.
+pub fn of_bodies(a: &StepProblem, b: &StepProblem) -> Vec<f64> {
     assert_eq!(a.bodies.len(), b.bodies.len());
-    let velocities =
-        |problem: &StepProblem| -> Vec<f32> { problem.bodies.iter().flat_map(|row| [row.v, row.w].concat()).collect() };
-    let apart = |(x, y): (f32, f32)| if (x - y).is_nan() { f64::INFINITY } else { f64::from((x - y).abs()) };
-    velocities(a).into_iter().zip(velocities(b)).map(apart).fold(0.0, f64::max)
+    let apart = |(x, y): (&f32, &f32)| if (x - y).is_nan() { f64::INFINITY } else { f64::from((x - y).abs()) };
+    let of_body = |(a, b): (&BodyRow, &BodyRow)| {
+        let (a, b) = ([a.v, a.w], [b.v, b.w]);
+        a.as_flattened().iter().zip(b.as_flattened()).map(apart).fold(0.0, f64::max)
+    };
+    a.bodies.iter().zip(&b.bodies).map(of_body).collect()
+}
+
+/// The largest of the differences [`of_bodies`].
+pub fn of_velocities(a: &StepProblem, b: &StepProblem) -> f64 {
+    of_bodies(a, b).into_iter().fold(0.0, f64::max)
 }

@@ -1,10 +1,10 @@
 //! Compares every scene of the catalogue, in a small and short version, with the reference.
 
-use super::difference::of_velocities;
+use super::difference::of_bodies;
 use super::{Group, Outcome, Run, failed};
 use crate::compare::BodyDifference;
 use drystone::stages::backend::CheckedStep;
-use drystone::stats::{largest, median};
+use drystone::stats::{largest, median, quantile};
 use drystone::{Backend, Cpu, Reference, Result, Simulation, SolverConfig};
 use drystone_scenes::{CATALOGUE, Scene, Spawners};
 
@@ -26,11 +26,14 @@ const SMALL: [(&str, &[&str]); 14] = [
     ("card-house", &["storeys=2"]),
 ];
 
-/// Largest difference of a velocity after single steps of plain WGSL, relative to the largest speed; the median over
-/// some steps. On software Vulkan, the largest measured value over the catalogue is 6.8e-6, for boxes that tumble in a
-/// drum; this is seven times that. Contacts with impulses that are one percent off give 2.5e-4 for a chain, and 8e-4 or
-/// more for piles.
-const PLAIN_SCENE: f64 = 5e-5;
+/// Share of the bodies whose velocities must agree. Rounding decides whether a contact at its very limit opens: of 160
+/// parts of ragdolls that land, f32 and f64 move one apart by 1e-4 to 3e-3 of the largest speed in every other step.
+const MOST_BODIES: f64 = 0.9;
+
+/// Largest difference of the velocities of [`MOST_BODIES`] after single steps of plain WGSL, relative to the largest
+/// speed; the median over some steps. On software Vulkan, the largest over the catalogue is 2.4e-6, for boxes in a drum.
+/// Impulses of contacts and joints that are one percent off give 6e-5 to 6e-2 in most scenes.
+const PLAIN_SCENE: f64 = 2e-5;
 
 /// A scene that ran on the processor until bodies touch.
 pub(super) struct Warm {
@@ -114,7 +117,7 @@ async fn of_single_steps(run: &mut Run<'_>, mut ours: Warm) -> Outcome {
         Reference::<f32>::new().run(&mut results[0], &plan.passes)?;
         gpu.run_async(CheckedStep::new(&mut results[1], &plan.passes)?).await?;
         let [a, b] = &results;
-        apart.push(of_velocities(a, b));
+        apart.push(quantile(&of_bodies(a, b), MOST_BODIES));
         speed = largest(
             speed,
             a.bodies.iter().flat_map(|body| body.v.into_iter().chain(body.w)).map(|x| f64::from(x.abs())),
