@@ -103,10 +103,9 @@ struct ResidentParams {
 // A contact whose rows the host computed anew. One byte for each point holds the number that the point had before.
 struct Written { row: u32, points_before: u32 }
 
-// The manifold of such a contact. The arms of a point are six numbers, and `first_arms` counts the points before its
-// own.
+// The manifold of such a contact.
 struct WrittenContact {
     normal: vec3f, friction: f32,
     restitution: f32, radius_a: f32, radius_b: f32, substep_share: f32,
-    body_a: u32, body_b: u32, first_arms: u32, point_count: u32,
+    body_a: u32, body_b: u32, point_count: u32,
 }

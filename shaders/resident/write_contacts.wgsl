@@ -12,10 +12,11 @@ fn retangented(before: Contact, now: Contact, impulse: Impulse) -> Impulse {
     return Impulse(impulse.normal, dot3(friction, now.tangent), dot3(friction, tangent_2), 0.0);
 }
 
+// The two arms of a point are six numbers, and a manifold has room for those of MAX_POINTS.
 fn written_arm(at: u32) -> vec3f { return vec3f(written_arms[at], written_arms[at + 1u], written_arms[at + 2u]); }
 
 // Writes the points of a contact, and the patch that follows them.
-fn write_points(contact: Contact, first_arms: u32) {
+fn write_points(contact: Contact, i: u32) {
     let a = masses[contact.body_a];
     let b = masses[contact.body_b];
     let first = contact.first_point;
@@ -23,8 +24,8 @@ fn write_points(contact: Contact, first_arms: u32) {
     var middle_b = vec3f();
     var count = 0.0;
     for (var k = 0u; k < contact.point_count; k++) {
-        let r_a = written_arm(6u * (first_arms + k));
-        let r_b = written_arm(6u * (first_arms + k) + 3u);
+        let r_a = written_arm(6u * (MAX_POINTS * i + k));
+        let r_b = written_arm(6u * (MAX_POINTS * i + k) + 3u);
         let own = point_masses(resident.tangents == 1u, contact, a, b, r_a, r_b);
         points[first + k] = Point(r_a, 0.0, r_b, own.normal, own.tangent, 0.0, 0.0, 0.0);
         middle_a += r_a;
@@ -58,7 +59,7 @@ fn write_contact(i: u32) {
         own.radius_a, own.radius_b, select(before.preload, 0.0, is_new), own.substep_share,
     );
     contacts[row] = now;
-    if resident.has_points == 0u { write_points(now, own.first_arms); }
+    if resident.has_points == 0u { write_points(now, i); }
     let nothing = Impulse(0.0, 0.0, 0.0, 0.0);
     var old = array(nothing, nothing, nothing, nothing);
     var patch_impulse = nothing;

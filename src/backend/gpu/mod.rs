@@ -8,8 +8,8 @@
 //! poses, velocities and impulses. A step ends when all its results are on the host. If a device is lost, no state is
 //! lost: a failed step leaves the problem unchanged, and another device or the processor repeats it.
 //!
-//! A step is one submission and one read-back. If one submission would hold the device too long, it is divided
-//! (`submissions.rs`). The host waits for the read-back: the next step begins with detection, and detection needs the
+//! A step is one submission and one read-back. Hardware gets the submission in parts, and begins while the host encodes
+//! the rest. If one submission would hold the device too long, the host waits between several (`submissions.rs`). The host waits for the read-back: the next step begins with detection, and detection needs the
 //! poses of all bodies.
 
 mod adapter;
@@ -264,14 +264,21 @@ impl Gpu {
             self.pipelines.prepare(&dispatch.program, self.target, &self.buffers)?;
         }
         self.timer.iter_mut().for_each(Timer::begin);
+        // A submission must not use a missing buffer.
+        self.buffers.settle().await?;
+        let mut encode = |part: &[Dispatch]| {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            dispatch::encode(&mut encoder, part, &self.pipelines, self.target, self.timer.as_mut());
+            encoder
+        };
+        let at_once = self.target.dispatches_at_once();
         let mut rest = &all[..];
         loop {
             let (part, later) = rest.split_at(dispatch::first_part(rest, self.submissions.room()));
-            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            dispatch::encode(&mut encoder, part, &self.pipelines, self.target, self.timer.as_mut());
+            let (ahead, last) = part.split_at(part.len().saturating_sub(1) / at_once * at_once);
+            ahead.chunks(at_once).for_each(|some| self.submissions.submit(encode(some)));
+            let encoder = encode(last);
             let rows = part.iter().map(|dispatch| dispatch.work).sum();
-            // A submission must not use a missing buffer.
-            self.buffers.settle().await?;
             if later.is_empty() {
                 return Ok((encoder, rows));
             }

@@ -77,14 +77,14 @@ pub struct WrittenContact {
     pub body_a: u32,
     /// The other one.
     pub body_b: u32,
-    /// Index of the first arm of its points, in points.
-    pub first_arms: u32,
     /// Its number of points.
     pub point_count: u32,
+    #[doc(hidden)]
+    pub pad: u32,
 }
 
 impl WrittenContact {
-    fn of(contact: &ContactRow, first_arms: u32) -> Self {
+    fn of(contact: &ContactRow) -> Self {
         let &ContactRow { normal, friction, restitution, radius_a, radius_b, substep_share, .. } = contact;
         let &ContactRow { body_a, body_b, point_count, .. } = contact;
         Self {
@@ -96,8 +96,8 @@ impl WrittenContact {
             substep_share,
             body_a,
             body_b,
-            first_arms,
             point_count,
+            pad: 0,
         }
     }
 }
@@ -152,13 +152,13 @@ fn send_written(buffers: &mut Buffers, problem: &StepProblem, carry: &Carry) -> 
     if carry.written.iter().any(|written| written.row as usize >= problem.contacts.len()) {
         return Err(Error::input("contacts written again: a row does not exist"));
     }
-    let (mut contacts, mut arms) = (Vec::with_capacity(carry.written.len()), Vec::new());
-    for written in &carry.written {
-        let contact = &problem.contacts[written.row as usize];
-        contacts.push(WrittenContact::of(contact, arms.len() as u32));
-        let own = &problem.points[contact.first_point as usize..][..contact.point_count as usize];
-        arms.extend(own.iter().map(|point| [point.r_a, point.r_b]));
-    }
+    let written = || carry.written.par_iter().with_min_len(MIN_CONTACTS).map(|own| &problem.contacts[own.row as usize]);
+    let contacts: Vec<WrittenContact> = written().map(WrittenContact::of).collect();
+    let arms_of = |contact: &ContactRow| -> [[[f32; 3]; 2]; MAX_POINTS] {
+        let first = contact.first_point as usize;
+        std::array::from_fn(|k| [problem.points[first + k].r_a, problem.points[first + k].r_b])
+    };
+    let arms: Vec<_> = written().map(arms_of).collect();
     let rows: [(Binding, &[u8]); 3] = [
         (Binding::Written, bytemuck::cast_slice(&carry.written)),
         (Binding::WrittenContacts, bytemuck::cast_slice(&contacts)),

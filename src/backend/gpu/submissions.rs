@@ -31,7 +31,8 @@ pub(super) struct Submissions {
     reports: Arc<Mutex<Reports>>,
     loss: Option<Loss>,
     count: u32,
-    begun: Stopwatch,
+    /// When the first part of the present submission went to the device.
+    begun: Option<Stopwatch>,
     /// Target for the longest time of a submission on the device.
     target: Duration,
     /// Rows per second of the last submission.
@@ -60,9 +61,8 @@ impl Submissions {
             };
             locked(&losses).lost.get_or_insert(reason);
         });
-        let begun = Stopwatch::start();
         let taken = (0, Duration::ZERO);
-        Self { device, queue, adapter, reports, loss, count: 0, begun, target, speed: None, taken }
+        Self { device, queue, adapter, reports, loss, count: 0, begun: None, target, speed: None, taken }
     }
 
     /// Number of rows that one submission can sweep.
@@ -70,15 +70,17 @@ impl Submissions {
         self.speed.map_or(FIRST_ROWS, |speed| (speed * self.target.as_secs_f64()) as usize)
     }
 
-    /// Submits work to the device.
+    /// Sends work to the device. All work until the next [`Self::wait`] is one submission.
     pub fn submit(&mut self, encoder: wgpu::CommandEncoder) {
-        self.begun = Stopwatch::start();
+        if self.begun.is_none() {
+            self.begun = Some(Stopwatch::start());
+            self.count += 1;
+        }
         self.queue.submit([encoder.finish()]);
-        self.count += 1;
         self.lose(true);
     }
 
-    /// Waits for the device after work on `rows` rows was submitted. A web page continues with other tasks meanwhile;
+    /// Ends a submission of work on `rows` rows: waits for the device. A web page continues with other tasks meanwhile;
     /// elsewhere this thread blocks.
     ///
     /// # Errors
@@ -97,7 +99,7 @@ impl Submissions {
             let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(LONGEST_WAIT) };
             self.device.poll(wait)
         };
-        let time = self.begun.elapsed();
+        let time = self.begun.take().map_or(Duration::ZERO, |begun| begun.elapsed());
         if rows > 0 {
             self.speed = Some(rows as f64 / time.as_secs_f64().max(1e-6));
         }

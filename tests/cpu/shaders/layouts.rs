@@ -104,7 +104,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         }
         Written = Written { row points_before }
         WrittenContact = WrittenContact {
-            normal friction restitution radius_a radius_b substep_share body_a body_b first_arms point_count
+            normal friction restitution radius_a radius_b substep_share body_a body_b point_count
         }
     }
 }
