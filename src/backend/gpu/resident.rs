@@ -87,18 +87,7 @@ impl WrittenContact {
     fn of(contact: &ContactRow) -> Self {
         let &ContactRow { normal, friction, restitution, radius_a, radius_b, substep_share, .. } = contact;
         let &ContactRow { body_a, body_b, point_count, .. } = contact;
-        Self {
-            normal,
-            friction,
-            restitution,
-            radius_a,
-            radius_b,
-            substep_share,
-            body_a,
-            body_b,
-            point_count,
-            pad: 0,
-        }
+        Self { normal, friction, restitution, radius_a, radius_b, substep_share, body_a, body_b, point_count, pad: 0 }
     }
 }
 

@@ -111,6 +111,10 @@ fn main(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
 /// Workgroups of a copy: more threads than a large GPU runs at a time.
 const COPY_GROUPS: u32 = 4096;
 
+/// Least time of all copies (s), and their largest number.
+const LEAST_COPYING: f64 = 0.05;
+const MAX_COPIES: u32 = 2048;
+
 /// Bytes per second that a kernel reads and writes when it copies a large buffer. It bounds the speed of every sweep. The
 /// copy command would not do: on an NVIDIA H200 it reaches 0.85 TB/s, less than some kernels.
 ///
@@ -159,8 +163,15 @@ pub(super) async fn copy_bandwidth(device: &wgpu::Device, submissions: &mut Subm
         submissions.wait(0).await?;
         Ok(start.elapsed().as_secs_f64())
     };
-    // The first copy touches the memory. The difference of two times removes the fixed cost of a submission.
+    // The first copy touches the memory. The difference of two times removes the fixed cost of a submission. Short runs
+    // measure a GPU whose clock still rises.
     seconds(1).await?;
-    let (few, many) = (seconds(2).await?, seconds(10).await?);
-    Ok(2.0 * 8.0 * size as f64 / (many - few).max(1e-9))
+    let mut count = 8;
+    loop {
+        let copying = seconds(1 + count).await? - seconds(1).await?;
+        if copying > LEAST_COPYING || count >= MAX_COPIES {
+            return Ok(2.0 * f64::from(count) * size as f64 / copying.max(1e-9));
+        }
+        count *= 4;
+    }
 }
