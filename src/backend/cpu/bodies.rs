@@ -24,7 +24,7 @@ pub(super) struct State {
     pub velocity: Row8,
     /// dp . dq
     pub movement: Row8,
-    /// Inverse inertia xx xy xz, inverse mass, inverse inertia yy yz zz .
+    /// Inverse inertia xx xy xz, inverse mass, inverse inertia yy yz zz, locks.
     pub mass: Row8,
 }
 

@@ -28,8 +28,8 @@ pub(super) struct BodyLanes {
     pub places: [u32; WIDTH],
     /// The movable ones, one bit for each lane.
     pub movable: u16,
-    /// Those that do not move along x, along y and along z.
-    pub locked: [u16; 3],
+    /// Whether any of them has locked axes.
+    pub has_locks: bool,
 }
 
 impl LaneGroup {

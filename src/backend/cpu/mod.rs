@@ -128,8 +128,7 @@ impl Cpu {
         self.places.clear();
         self.places.extend(slots.iter().enumerate().map(|(body, &slot)| {
             let MassRow { inv_mass, locks, .. } = problem.masses.get(body).copied().unwrap_or_default();
-            let locked = [1, 2, 4].map(|axis| locks as u32 & axis != 0);
-            BodyPlace { place: place(slot as usize), is_movable: inv_mass > 0.0, locked }
+            BodyPlace { place: place(slot as usize), is_movable: inv_mass > 0.0, has_locks: locks > 0.0 }
         }));
         let on = (self.instructions, threads);
         let is_any = |uses: fn(Kernel) -> bool| passes.iter().any(|pass| uses(pass.kernel));

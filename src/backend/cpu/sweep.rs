@@ -163,20 +163,40 @@ unsafe fn wide_pair<L: Lanes>(states: *const State, a: &BodyLanes, b: &BodyLanes
 /// The places are those of states, and no other thread uses those that can move meanwhile.
 #[inline(always)]
 unsafe fn store_velocities<L: Lanes>(states: *mut State, bodies: &BodyLanes, body: &Body<L>) {
-    let BodyLanes { places, movable, locked } = *bodies;
+    let BodyLanes { places, movable, has_locks } = *bodies;
     if movable == 0 {
         return;
     }
-    let mut rows = velocity_rows(body.v, body.w);
-    for (axis, lanes) in locked.into_iter().enumerate().filter(|(_, lanes)| *lanes != 0) {
-        let own = rows.iter_mut().enumerate().filter(|(lane, _)| lanes & (1 << lane) != 0);
-        own.for_each(|(_, row)| row.0[axis] = 0.0);
-    }
+    let rows = velocity_rows(body.v, body.w);
     for lane in 0..WIDTH {
         // Almost always all are movable.
         if movable == u16::MAX || movable & (1 << lane) != 0 {
             // SAFETY: the caller's promise.
             unsafe { row_at((&raw mut (*states).velocity).cast_const(), places[lane]).cast_mut().write(rows[lane]) };
+        }
+    }
+    if has_locks {
+        // SAFETY: the caller's promise.
+        unsafe { keep_locks(states, places, movable) };
+    }
+}
+
+/// Stops movable bodies along their locked axes. It is not inline: the sweeps of worlds without locks would take
+/// longer.
+///
+/// # Safety
+/// That of [`store_velocities`].
+#[cold]
+#[inline(never)]
+unsafe fn keep_locks(states: *mut State, places: [u32; WIDTH], movable: u16) {
+    for lane in (0..WIDTH).filter(|lane| movable & (1 << lane) != 0) {
+        // SAFETY: the caller's promise.
+        let (locks, velocity) = unsafe {
+            let mass = row_at(&raw const (*states).mass, places[lane]).read();
+            (mass.0[7], &mut *row_at((&raw mut (*states).velocity).cast_const(), places[lane]).cast_mut())
+        };
+        for axis in (0..3).filter(|axis| locks as u32 & (1 << axis) != 0) {
+            velocity.0[axis] = 0.0;
         }
     }
 }

@@ -11,12 +11,12 @@ use super::lane_rows::{LaneImpulses, OwnImpulses, OwnPoints, SharedImpulses, Sha
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, lanes};
 use crate::problem::StepProblem;
 
-/// The place of a body's state, whether the body is movable, and the axes along which it does not move.
+/// The place of a body's state, and whether the body is movable and has locked axes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BodyPlace {
     pub place: u32,
     pub is_movable: bool,
-    pub locked: [bool; 3],
+    pub has_locks: bool,
 }
 
 /// Loads the rows of groups.
@@ -64,12 +64,8 @@ impl<C: Constraint> Load<'_, C> {
         for (lanes, side) in [&mut group.a, &mut group.b].into_iter().zip(0..) {
             let places = bodies.map(|bodies| self.places[bodies[side] as usize]);
             lanes.places = places.map(|body| body.place);
-            let bits = |is: &dyn Fn(&BodyPlace) -> bool| {
-                places.iter().rev().fold(0, |bits, body| bits << 1 | u16::from(is(body)))
-            };
-            lanes.movable = bits(&|body| body.is_movable);
-            let any_locked = places.iter().any(|body| body.locked != [false; 3]);
-            lanes.locked = if any_locked { [0, 1, 2].map(|axis| bits(&|body| body.locked[axis])) } else { [0; 3] };
+            lanes.movable = places.iter().rev().fold(0, |bits, body| bits << 1 | u16::from(body.is_movable));
+            lanes.has_locks = places.iter().any(|body| body.has_locks);
         }
     }
 
