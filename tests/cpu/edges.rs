@@ -253,26 +253,25 @@ fn travel(floor: Floor, cases: &[Case]) -> Vec<Journey> {
 }
 
 /// Whether a traveler is a cylinder or capsule that friction keeps rolling.
-fn is_ridge(traveler: &Traveler, friction: bool) -> bool {
-    traveler.rolls && friction && !traveler.shape.is_ball()
+fn is_ridge(case: &Case) -> bool {
+    case.traveler.rolls && case.friction && !case.traveler.shape.is_ball()
 }
 
 /// Travelers on a floor, at speeds from 1 to 20 m/s, beside and above the edge along the way.
 #[track_caller]
-fn assert_edges_cost_nothing(floor: Floor, is_asked: fn(&Traveler, bool) -> bool) {
+fn assert_edges_cost_nothing(floor: Floor, is_asked: fn(&Case) -> bool) {
     let all = travelers();
     let mut broken = Vec::new();
     for speed in [1.0, 5.0, 20.0] {
         let both = all.iter().flat_map(|traveler| [false, true].map(|friction| (traveler, friction)));
-        let asked = both.filter(|&(traveler, friction)| is_asked(traveler, friction));
-        let cases = asked.flat_map(|(traveler, friction)| [0.0, 0.37].map(|z| Case { traveler, speed, friction, z }));
+        let cases = both.flat_map(|(traveler, friction)| [0.0, 0.37].map(|z| Case { traveler, speed, friction, z }));
         // A slow journey is long, and single precision rounds the small impulses of friction that go with it by some percent.
         let is_exact = |case: &Case| match (case.friction, case.traveler.rolls) {
             (false, _) => speed > 1.0 || case.z > 0.0,
             (true, true) => speed > 1.0,
             (true, false) => speed > 10.0,
         };
-        let cases: Vec<Case> = cases.filter(is_exact).collect();
+        let cases: Vec<Case> = cases.filter(|case| is_exact(case) && is_asked(case)).collect();
         for (case, journey) in cases.iter().zip(travel(floor, &cases)) {
             if !(journey.lost.abs() <= 1e-3 && journey.hop <= 5e-4 * SIZE) {
                 let Case { traveler, friction, z, .. } = case;
@@ -285,22 +284,22 @@ fn assert_edges_cost_nothing(floor: Floor, is_asked: fn(&Traveler, bool) -> bool
 
 #[test]
 fn edges_of_a_mesh_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Mesh, |_, _| true);
+    assert_edges_cost_nothing(Floor::Mesh, |_| true);
 }
 
 #[test]
 fn edges_of_a_height_field_cost_nothing() {
-    assert_edges_cost_nothing(Floor::HeightField, |_, _| true);
+    assert_edges_cost_nothing(Floor::HeightField, |_| true);
 }
 
 #[test]
 fn edges_of_boxes_in_a_row_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Boxes, |traveler, friction| !is_ridge(traveler, friction));
+    assert_edges_cost_nothing(Floor::Boxes, |case| !is_ridge(case));
 }
 
 #[test]
 fn edges_of_the_parts_of_a_body_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Parts, |traveler, friction| !is_ridge(traveler, friction));
+    assert_edges_cost_nothing(Floor::Parts, |case| !is_ridge(case));
 }
 
 #[test]
@@ -311,40 +310,41 @@ fn edges_of_boxes_cost_what_rolls_on_a_side_nothing() {
 
 #[test]
 fn edges_between_meshes_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Tiles, |_, _| true);
+    assert_edges_cost_nothing(Floor::Tiles, |_| true);
 }
 
 #[test]
 fn the_edges_of_voxels_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Voxels, |_, _| true);
+    assert_edges_cost_nothing(Floor::Voxels, |_| true);
 }
 
 #[test]
 fn edges_between_height_fields_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Fields, |_, _| true);
+    assert_edges_cost_nothing(Floor::Fields, |_| true);
 }
 
 #[test]
 fn edges_between_meshes_fields_and_boxes_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Mixed, |traveler, friction| {
-        traveler.shape.as_cuboid().is_none() && !is_ridge(traveler, friction)
+    assert_edges_cost_nothing(Floor::Mixed, |case| {
+        let is_slow_box = case.traveler.shape.as_cuboid().is_some() && case.speed < 10.0;
+        is_slow_box || case.traveler.shape.as_cuboid().is_none() && !is_ridge(case)
     });
 }
 
 #[test]
 #[ignore = "a box at 20 m/s catches on a box between meshes, and a cylinder that rolls at 5 m/s hops by 0.3 mm"]
 fn edges_between_meshes_fields_and_boxes_cost_boxes_nothing() {
-    assert_edges_cost_nothing(Floor::Mixed, |_, _| true);
+    assert_edges_cost_nothing(Floor::Mixed, |_| true);
 }
 
 #[test]
 fn edges_that_end_within_others_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Junctions, |_, _| true);
+    assert_edges_cost_nothing(Floor::Junctions, |_| true);
 }
 
 #[test]
 fn edges_of_meshes_on_a_half_space_cost_nothing() {
-    assert_edges_cost_nothing(Floor::Carpet, |_, _| true);
+    assert_edges_cost_nothing(Floor::Carpet, |_| true);
 }
 
 /// Plates of 4 m at y = 0 that end at x = 0, where nothing goes on.

@@ -25,6 +25,7 @@ tests! {
         rows_that_are_not_there_are_refused,
         a_device_carries_the_friction_of_patches_to_manifolds_that_are_computed_anew,
         a_device_carries_no_friction_that_a_surface_lost,
+        a_device_takes_rows_of_another_layout,
         a_device_takes_the_points_that_are_sent,
         a_device_bounces_only_what_was_pressed_in_the_same_step,
         a_body_that_is_placed_on_a_tower_begins_on_a_device_with_what_it_rests_with,
@@ -414,6 +415,13 @@ fn a_device_carries_no_friction_that_a_surface_lost() {
             world.bodies[1].material.friction = 0.0;
             world.bodies[1].position.x += 0.02;
         }
+    });
+}
+
+/// With rolling friction, each manifold gets one more row.
+fn a_device_takes_rows_of_another_layout() {
+    same_on_a_device(sliding(), &SolverConfig::default().without_sleep(), 40, |step, world| {
+        world.bodies[0].material.rolling_friction = if (10..25).contains(&step) { 0.02 } else { 0.0 };
     });
 }
 
