@@ -19,6 +19,7 @@ mod island;
 use glam::Vec3;
 
 use crate::config::{Method, SolverConfig, Stabilization};
+use crate::constants::{FALL, LEVEL, LEVERAGE, LONG_SUBSTEPS, UNBALANCED_SUBSTEPS};
 use crate::error::{Result, ensure};
 use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
@@ -141,19 +142,6 @@ impl Saved for Effort {
     }
 }
 
-/// Fewest substeps of an island with a body that began unbalanced, until the body rests or falls. Of 15 arches with 13
-/// to 41 wedges, 0.12 of the radius thick, 4 stand with 8 substeps, 9 with 16 and 10 with 32.
-const UNBALANCED_SUBSTEPS: f32 = 32.0;
-/// From this number of substeps on, a class falls after a number of substeps and not of steps, because each step costs
-/// more.
-const LONG_SUBSTEPS: u32 = 64;
-/// A body as fast as after a fall of this time does not come to rest in place (s).
-const FALL: f32 = 0.1;
-
-/// Largest load of a contact, over the sum of the loads of its island. A body that leans on others, as a wedge does,
-/// presses with more than its weight.
-const LEVERAGE: f32 = 4.0;
-
 /// The largest load of a body on its contacts in a step (N): its weight, its applied force and torque, and the force
 /// that stops it within the step.
 fn load_of(body: &Body, gravity: Vec3, dt: f32) -> f32 {
@@ -253,7 +241,8 @@ impl Effort {
     /// Decides the first classes from the loads of statics.
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
         // The bounding boxes of neighboring bodies may overlap.
-        let touches = |upper: usize, gap: f64| gap.abs() < 0.1 * f64::from(world.bodies[upper].smallest_half_extent());
+        let touches =
+            |upper: usize, gap: f64| gap.abs() < LEVEL * f64::from(world.bodies[upper].smallest_half_extent());
         let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
         let interface = |load: &Load| {
             let size = [load.upper, load.lower].map(|body| world.bodies[body].smallest_half_extent());

@@ -14,6 +14,7 @@ use glam::{DMat3, DVec3, Quat, Vec3};
 use rayon::prelude::*;
 
 use crate::config::SolverConfig;
+use crate::constants::{COARSE, HELPS, LAST_BITS, MAX_ROUNDINGS, REGAINED, ROUNDING};
 use crate::effort::Effort;
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
@@ -22,24 +23,6 @@ use crate::problem::damping::Decay;
 use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem, pose_after};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
-
-/// Limits of an island's reserve, the part of its earlier losses that it can regain: the first share of its kinetic
-/// energy, plus the second share of the weight of its bodies times their size.
-const REGAINED: f64 = 1e-3;
-const ROUNDING: f64 = 1e-6;
-/// The distance between the highest and the lowest place that rounding gives a jointed body, relative to its distance
-/// from the origin plus its lever: the position, the rotation, the arm and their sum each round by up to half of
-/// `EPSILON`, up or down.
-const LAST_BITS: f64 = 4.0 * f32::EPSILON as f64;
-/// Largest number of substeps in a step for which rounding of velocities adds up. Shorter substeps sum changes, which
-/// round less.
-const MAX_ROUNDINGS: f64 = 16.0;
-
-/// Share of its energy that an island with joints can gain in a step before it takes shorter substeps.
-const COARSE: f64 = 0.1;
-/// Shorter substeps have to reduce that share to this fraction before an island takes them again. If joints and
-/// contacts push against each other, shorter substeps make the gain larger.
-const HELPS: f32 = 0.5;
 
 /// The energy accounts of all islands.
 #[derive(Debug, Default)]

@@ -49,6 +49,7 @@ pub mod batch;
 pub mod character;
 mod collide;
 pub mod config;
+mod constants;
 mod effort;
 mod energy;
 mod error;

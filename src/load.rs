@@ -13,16 +13,13 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use rayon::prelude::*;
 
 use crate::config::{SolverConfig, Stabilization};
+use crate::constants::LEVEL;
 use crate::error::{Error, Result, input};
 use crate::math::rotation::product;
 use crate::world::{Body, BodyKind, World, placed, pose};
 
 /// Largest number of substeps that the settings accept.
 const MAX_SUBSTEPS: f64 = 4096.0;
-/// The bodies beneath a body share its load if their tops are within this distance of the highest top, relative to the
-/// height of the upper body.
-const LEVEL: f64 = 0.1;
-
 /// The load of one body on another.
 ///
 /// ```

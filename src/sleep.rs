@@ -17,6 +17,7 @@ use glam::{Quat, Vec3};
 
 use crate::collide::{Activity, Detector, Pair};
 use crate::config::SolverConfig;
+use crate::constants::{COMING_OUT, DEEP_OVERLAP, STEPS_TO_SLEEP};
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
 use crate::saved::{Archive, Saved};
@@ -97,15 +98,9 @@ crate::saved::cloned!(Sleep {
     steps,
 } scratch { islands });
 
-/// Overlap, relative to the promised sag, above which a body that still comes out of another stays awake. Preloads lift
-/// resting bodies out of deeper overlaps.
-const DEEP: f32 = 0.25;
-/// A body comes out of another if its present speed ends the overlap within this time (s).
-const COMING_OUT: f32 = 10.0;
-
 /// Whether overlapping bodies separate.
 fn comes_out(pair: &Pair, world: &World, config: &SolverConfig) -> bool {
-    let deep = DEEP * config.promised_sag(pair.size);
+    let deep = DEEP_OVERLAP * config.promised_sag(pair.size);
     let going_on = pair.manifolds.iter().filter(|manifold| !manifold.has_ended());
     let mut points = going_on.flat_map(|manifold| pair.overlaps(manifold, world));
     points.any(|(overlap, parting)| overlap > deep && COMING_OUT * parting > overlap)
@@ -117,9 +112,6 @@ fn touching_or_tied(world: &World, detector: &Detector) -> impl Iterator<Item = 
     let joints = world.joints.iter().filter(|joint| !joint.holds_nothing());
     touching.chain(joints.map(Joint::indices))
 }
-
-/// Number of steps between two searches for islands.
-const EVERY: u32 = 8;
 
 /// How [`Sleep::walk`] writes the state in which a body was left.
 #[derive(Clone, Copy, PartialEq)]
@@ -333,7 +325,7 @@ impl Sleep {
             }
         }
         self.steps += 1;
-        if ready && self.steps.is_multiple_of(EVERY) {
+        if ready && self.steps.is_multiple_of(STEPS_TO_SLEEP) {
             self.let_islands_sleep(world, detector, config);
         }
     }

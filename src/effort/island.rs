@@ -1,5 +1,6 @@
 //! One island: its needs and its next class.
 
+use crate::constants::{DESCENT_SHARE, DESCENT_STEPS};
 use crate::stats::EFFORT_CLASSES;
 
 /// The facts that decide the class of an island.
@@ -60,11 +61,6 @@ impl Island {
     }
 }
 
-/// Steps in which the next lower class is enough, after which an island goes down one class, up to `long_from`. Each
-/// class above halves the number.
-const DESCENT_STEPS: u32 = 60;
-/// The share of the promise that the next lower class has to keep.
-const DESCENT_SHARE: f32 = 0.5;
 /// The highest class of all.
 pub const HIGHEST: u8 = EFFORT_CLASSES as u8 - 1;
 

@@ -2,8 +2,9 @@
 
 use glam::{Quat, Vec3};
 
-use super::{Entry, LAST_BITS, can_move, ends, moved_by};
+use super::{Entry, can_move, ends, moved_by};
 use crate::config::SolverConfig;
+use crate::constants::LAST_BITS;
 use crate::kernels::Rules;
 use crate::kernels::axis::{axis_inverse_mass, axis_motion, axis_speed};
 use crate::kernels::pair::relative_movement;

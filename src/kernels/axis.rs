@@ -3,6 +3,7 @@
 use super::Rules;
 use super::pair::{has_locks, inverse_masses, keep_locks, note_correction, relative_movement};
 use super::rows::{Axis, Joint, Pair, StepParams};
+use crate::constants::MIN_MOVED;
 use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, smaller, turned, vec3};
 
 /// Motion of the bodies along an axis. Twin of the WGSL struct `AxisMotion`.
@@ -91,9 +92,6 @@ fn apply_axis_impulse<L: Lane>(pair: &mut Pair<L>, motion: &AxisMotion<L>, p: L)
     pair.b.w -= pair.mass_b.inv_inertia.times(motion.about_b) * p;
     keep_locks(pair);
 }
-
-/// The least movement of bodies with locked axes, relative to that of free ones: 2^-20.
-const MIN_MOVED: f64 = 9.536_743_164_062_5e-7;
 
 /// The speed that a unit impulse along the axis gives. Bodies with locked axes move by `MIN_MOVED` of those without
 /// at least.

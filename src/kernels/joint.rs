@@ -5,6 +5,7 @@ use super::Rules;
 use super::axis::select3;
 use super::pair::{apply_impulse, inverse_masses, note_correction, relative_movement, relative_velocity};
 use super::rows::{Joint, Mass, Pair, StepParams};
+use crate::constants::STIFFENING;
 use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, turned, vec3};
 
 /// The present arms. They turned with their bodies since the step began.
@@ -59,9 +60,6 @@ fn solve_block<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, u: Vec3<L>) -> Vec3<
     let c = cofactors(x, y, z, STIFFENING);
     vec3(dot3(c.x, u), dot3(c.y, u), dot3(c.z, u)) * reciprocal(c.determinant) * c.scale
 }
-
-/// 2^-19. Rounding changes the determinant of a block with a trace of 1 to 2 by 3e-7.
-const STIFFENING: f64 = 1.907_348_632_812_5e-6;
 
 /// Applies the carried impulse of a joint. Kernel `warm_start_joints`.
 #[inline(always)]

@@ -14,6 +14,7 @@ use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock, sel
 use super::joint::current_anchors;
 use super::pair::{relative_movement, relative_velocity};
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
+use crate::constants::MIN_PIVOT;
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, turned, vec3};
 use crate::problem::arithmetic::unlocked;
 use crate::problem::{JointSystems, NodeRow};
@@ -178,11 +179,6 @@ impl<L: Lane> Block<L> {
         rest
     }
 }
-
-/// The smallest pivot of a row, relative to the trace of its block in S: 2^-20, above the rounding errors of the
-/// products that are subtracted from a pivot. A smaller pivot is raised to this, so corrections are too small, never
-/// too large.
-const MIN_PIVOT: f64 = 9.536_743_164_062_5e-7;
 
 /// One over a pivot of at least `least`; 0 for a row whose diagonal was zero in S.
 #[inline(always)]

@@ -13,6 +13,7 @@ use std::fmt;
 use std::ops::Range;
 
 use crate::config::{Clamping, FUSE_BELOW, FrictionOrder, FrictionRule, FrictionSweeps, Method, SolverConfig};
+use crate::constants::{JAMMED_PASSES, LONGEST_FROM_START};
 use crate::kernels::Rules;
 use crate::problem::{Block, ContactSummary, StepProblem};
 
@@ -47,11 +48,6 @@ struct Sweeps<'a> {
     /// Contacts with jamming friction.
     jamming: &'a [Range<u32>],
 }
-
-/// Number of sweeps over a jamming contact before the next contact. A rod whose tip is pushed into a floor (`drystone
-/// hard --case painleve`) gains up to 2.8e-2 of its energy in a step with 1 sweep, 7.7e-3 with 2, 5.4e-4 with 4 and
-/// 1e-5 with 8, at 4 to 128 substeps.
-const JAMMED_PASSES: u8 = 8;
 
 /// The passes of one step.
 ///
@@ -140,11 +136,6 @@ impl PlanKey {
 fn isotropic(problem: &StepProblem) -> impl Iterator<Item = bool> {
     problem.blocks.iter().map(|block| problem.is_isotropic(problem.rows_of(&(block.bodies..block.bodies + 1))))
 }
-
-/// In shorter substeps than this (s), velocities are changes since the start of the step. Sums of velocities have a
-/// squared error of 3e-6 m²/s² in the scene `rolling` at 1/8000 s and 3e-4 at 1/32,000 s. They change the energy of a
-/// free rotation in 20 s by 8e-6 at 1/480 s and by 3e-5 at 1/1920 s.
-const LONGEST_FROM_START: f32 = 1.0 / 1000.0;
 
 impl StepPlan {
     /// The plan of `problem` with `config`: one block after another.

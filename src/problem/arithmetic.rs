@@ -1,6 +1,7 @@
 //! The rows of a contact, from its manifold and from the masses and poses of its bodies. The functions of effective
 //! masses are the twins of `shaders/lib/prepare.wgsl`. Only the processor computes separations.
 
+use crate::constants::MIN_JAMMING;
 use crate::math::{Lane, NormalMovement, Quat, Vec3, cross3, dot3, reciprocal, vec3};
 
 /// A symmetric 3x3 matrix: the upper triangle, row by row.
@@ -52,10 +53,6 @@ pub fn unlocked<L: Lane>(locks: L, v: Vec3<L>) -> Vec3<L> {
     let x = (rest - L::select(zero, L::constant(2.0), y)).gt(L::constant(0.5));
     vec3(L::select(v.x, zero, x), L::select(v.y, zero, y), L::select(v.z, zero, z))
 }
-
-/// No solid of even density jams with friction up to this. A point at the distance r from the center of such a solid
-/// has m r²/I <= 15, and with that ratio friction below 8/15 jams no point (docs/derivation.md, section 6).
-pub const MIN_JAMMING: f32 = 0.53;
 
 /// 1/x, to half an ulp for most x; 0 if x is not positive.
 #[inline(always)]
@@ -181,19 +178,19 @@ pub fn point_masses<L: Lane>(
     let PointKinds { tangents, jams, locked } = kinds;
     let (n, t_1) = (frame.normal, frame.tangent);
     let t_2 = cross3(n, t_1);
-    let entry = |d: Vec3<L>, e: Vec3<L>| entry(locked, masses, arms, d, e);
-    let parted = entry(n, n);
-    let mut masses = PointMasses { normal: inverse_or_zero(parted), ..PointMasses::default() };
+    // No closure: a compiler may leave it out of line, without the instructions of the lanes.
+    let parted = entry(locked, masses, arms, n, n);
+    let mut own = PointMasses { normal: inverse_or_zero(parted), ..PointMasses::default() };
     if jams {
-        let pressed_1 = entry(n, t_1);
-        masses.jamming = jamming(frame.friction, parted, pressed_1, entry(n, t_2));
-        masses.normal = masses.normal * normal_step(masses.jamming);
+        let pressed_1 = entry(locked, masses, arms, n, t_1);
+        own.jamming = jamming(frame.friction, parted, pressed_1, entry(locked, masses, arms, n, t_2));
+        own.normal = own.normal * normal_step(own.jamming);
     }
     if tangents {
-        let (s_11, s_22) = (entry(t_1, t_1), entry(t_2, t_2));
-        masses.tangent = tangent_mass(s_11, s_22, entry(t_1, t_2));
+        let (s_11, s_22) = (entry(locked, masses, arms, t_1, t_1), entry(locked, masses, arms, t_2, t_2));
+        own.tangent = tangent_mass(s_11, s_22, entry(locked, masses, arms, t_1, t_2));
     }
-    masses
+    own
 }
 
 /// Place of a body: its center of mass and its rotation.

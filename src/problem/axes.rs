@@ -20,11 +20,8 @@ use super::effective::InverseMass;
 use super::rows::{AxisRow, JointRow, MassRow, NO_LIMIT};
 use super::softness::softness;
 use super::{NodeRow, StepProblem};
+use crate::constants::STIFFEST;
 use crate::world::{Axis, BodyKind, Bounds, Drive, Joint, JointMotion, Linear, MIN_DISTANCE, World};
-
-/// The solver integrates springs that turn by more than this in a substep (rad) implicitly, which takes energy away.
-/// Otherwise several such springs on one body would gain energy.
-const STIFFEST: f32 = 0.5;
 
 /// The axes of a joint that may have rows, by their numbers: 0 to 2 for shifts, 3 to 5 for turns.
 fn axes_of(joint: &Joint) -> impl Iterator<Item = (usize, &Axis)> {

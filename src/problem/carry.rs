@@ -6,6 +6,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::constants::LARGEST_PRELOAD;
 use crate::math::{Lane, smaller};
 
 /// The changes since the last step, for a backend that has the rows of that step.
@@ -69,9 +70,6 @@ pub struct Preload {
     /// 1 if impulses are carried over, 0 if every step begins without them.
     pub warm_start: u32,
 }
-
-/// Largest preload of a contact, relative to its overlap at rest under its load.
-pub(super) const LARGEST_PRELOAD: f64 = 2.0;
 
 impl Preload {
     /// Compression of the springs of a contact at rest under the normal impulses `pressed`, times their effective mass

@@ -8,8 +8,6 @@ use super::arithmetic::{Mass, Sym3};
 use super::rows::{ContactRow, MassRow};
 use crate::math;
 
-pub use super::arithmetic::MIN_JAMMING;
-
 /// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseMass {

@@ -6,15 +6,10 @@ use glam::{DMat3, Vec3};
 use super::StepProblem;
 use super::effective::InverseMass;
 use super::rows::TurningRow;
+use crate::constants::SWING_LIMIT;
 
 /// Stiffness inertia of a body from one joint: the body, and the inertia.
 pub(super) type StiffnessInertia = (u32, DMat3);
-
-/// (h w)² above which a body gets stiffness inertia, where w is the frequency at which it swings under the pull of its
-/// joints. Explicit steps are stable below 4. The value was measured on chains of 10 to 300 links with 1000 times the
-/// mass at the end, which go slack and snap, over 50 s. With 3 no chain gains energy and gaps stay below 25 mm. With 2 and
-/// less, energy grows by up to 0.1 of the swing, as the added inertia comes and goes. With 4 gaps reach 2.5 m.
-const SWING_LIMIT: f64 = 3.0;
 
 /// h² times the rotational stiffness of a body under a joint at the arm `r` that pulls with `impulse` in a substep of
 /// `h` seconds: r·F about axes perpendicular to the arm where r·F is positive, otherwise 0. F is `impulse` / h.

@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::constants::{AXIS_SOFTNESS, LOOP_SOFTNESS};
+
 /// Connected sets of joints. Each is solved directly by S = L D Lᵀ, in blocks of 3 x 3.
 #[derive(Debug, Default, PartialEq)]
 pub struct JointSystems {
@@ -233,15 +235,6 @@ impl JointSystems {
         }
     }
 }
-
-/// Softness of joints in loops. Loops may be redundant, as in a flat sheet. S is then singular and determines no
-/// impulse. A joint with 2^-14 / 3 yields by 0.04 mm at 1/480 s under 300 times the mass of a ball.
-const LOOP_SOFTNESS: f32 = 6.103_515_6e-5 / 3.0;
-
-/// Softness of joints in trees with locked angles, 2^-19 / 3, above the rounding errors. In single precision the turn
-/// of one link is lost in the turn of a long lever of links: the pivot of the link is a difference of numbers 1e7 times
-/// as large.
-const AXIS_SOFTNESS: f32 = 1.907_348_6e-6 / 3.0;
 
 /// Whether the bodies have more joints than they need. `joints` has the movable bodies of each joint.
 fn has_loops(joints: &[[Option<u32>; 2]]) -> bool {

@@ -11,6 +11,7 @@ use super::joint_sets::{gap_of_sweeps, promised_gap};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
+use crate::constants::{GROWTH, MAX_TERMS_A_NODE};
 use crate::effort::{self, Effort, Interface, JointNeed};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
@@ -65,9 +66,6 @@ crate::saved::state!(JointRows {
     left,
 } scratch { graph, sums, gap_of_turns, step, stiffness_inertias });
 
-/// The factor by which a joint of a swinging net may open further in the next step.
-const GROWTH: f32 = 2.5;
-
 /// The need of a joint that is left to sweeps; 0 for other joints.
 #[derive(Clone, Copy, Debug)]
 struct LeftToSweeps {
@@ -83,10 +81,6 @@ crate::saved::fields!(LeftToSweeps { need, gap, force });
 impl LeftToSweeps {
     const NONE: Self = Self { need: 0.0, gap: f32::INFINITY, force: f32::INFINITY };
 }
-
-/// Most products of blocks for each node. A chain of balls has 1, a ring 3, and a ladder with two joints at each seam
-/// 6. A sheet of 16 x 16 balls has 100, where more substeps are cheaper.
-const MAX_TERMS_A_NODE: usize = 24;
 
 /// Stands for the system of a joint that is swept.
 const SWEPT: u32 = u32::MAX;

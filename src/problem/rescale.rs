@@ -1,9 +1,9 @@
 //! Scales impulses and preloads when the length of a substep or the stiffness of contacts changes.
 
 use super::StepProblem;
-use super::carry::LARGEST_PRELOAD;
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use crate::config::SolverConfig;
+use crate::constants::LARGEST_PRELOAD;
 use crate::world::{BodyKind, World};
 
 /// The numbers that scale the impulses and preloads of a step.

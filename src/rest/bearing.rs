@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::constants::{FRICTION_LEFT, MAX_ROUNDS, NO_FORCE, NO_RESISTANCE, POINT_STIFFNESS, UNBALANCED};
+
 /// A force and its moment about a center of mass (N, N m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Wrench {
@@ -39,19 +41,6 @@ impl Point {
         self.axes[0] * parts[0] + self.axes[1] * parts[1] + self.axes[2] * parts[2]
     }
 }
-
-/// Stiffness of single points, and of friction, relative to that of whole manifolds. A manifold has one preload, so its
-/// points should carry equal loads where they can.
-const TILT: f64 = 0.02;
-const SLIP: f64 = 0.02;
-/// The share of a load that may stay unbalanced.
-const UNBALANCED: f64 = 1e-4;
-/// Stiffness against motions that no point resists, relative to the largest stiffness.
-const NO_RESISTANCE: f64 = 1e-10;
-/// Most rounds of letting go of points and limiting friction.
-const ROUNDS: usize = 24;
-/// Forces below this share of the largest force are rounding errors.
-const ROUNDING: f64 = 1e-9;
 
 type Six = [f64; 6];
 
@@ -102,9 +91,9 @@ impl Balance {
         self.springs.extend(points.iter().map(|point| Spring {
             along: point.axes.map(|axis| six(axis, point.arm.cross(axis) / unit)),
             bears: point.bears,
-            slip: if point.bears && point.friction > 0.0 { SLIP * point.mass } else { 0.0 },
+            slip: if point.bears && point.friction > 0.0 { POINT_STIFFNESS * point.mass } else { 0.0 },
         }));
-        let is_within = (0..ROUNDS).any(|_| {
+        let is_within = (0..MAX_ROUNDS).any(|_| {
             self.press(points, &wanted);
             self.are_within_limits(points)
         });
@@ -121,7 +110,7 @@ impl Balance {
                 let (mean, mass) = &mut self.means[point.manifold as usize];
                 mean.iter_mut().zip(spring.along[0]).for_each(|(sum, x)| *sum += point.mass * x);
                 *mass += point.mass;
-                add_square(&mut stiffness, &spring.along[0], TILT * point.mass);
+                add_square(&mut stiffness, &spring.along[0], POINT_STIFFNESS * point.mass);
                 add_square(&mut stiffness, &spring.along[1], spring.slip);
                 add_square(&mut stiffness, &spring.along[2], spring.slip);
             }
@@ -136,7 +125,8 @@ impl Balance {
             if !spring.bears {
                 return [0.0; 3];
             }
-            let pressed = dot(&self.means[point.manifold as usize].0, &motion) + TILT * dot(&spring.along[0], &motion);
+            let pressed =
+                dot(&self.means[point.manifold as usize].0, &motion) + POINT_STIFFNESS * dot(&spring.along[0], &motion);
             [
                 point.mass * pressed,
                 spring.slip * dot(&spring.along[1], &motion),
@@ -150,7 +140,7 @@ impl Balance {
         let most = self.forces.iter().fold(0.0_f64, |most, force| most.max(force[0]));
         let mut are_within = true;
         for (spring, force) in self.springs.iter_mut().zip(&mut self.forces) {
-            if force[0] < -ROUNDING * most {
+            if force[0] < -NO_FORCE * most {
                 spring.bears = false;
                 are_within = false;
             }
@@ -161,8 +151,8 @@ impl Balance {
         }
         for ((spring, force), point) in self.springs.iter_mut().zip(&self.forces).zip(points) {
             let (slip, limit) = (libm::hypot(force[1], force[2]), point.friction * force[0]);
-            if slip > limit + ROUNDING * most {
-                spring.slip *= 0.9 * limit / slip;
+            if slip > limit + NO_FORCE * most {
+                spring.slip *= FRICTION_LEFT * limit / slip;
                 are_within = false;
             }
         }

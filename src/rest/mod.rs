@@ -17,14 +17,10 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 
 use crate::config::{FrictionRule, SolverConfig, Stabilization};
+use crate::constants::{MAX_ROUNDS, MIN_RISE};
 use crate::problem::{BodyRow, ContactRow, ContactRows, PointRow, StepProblem};
 use crate::world::{Body, World};
 use bearing::{Balance, Point, Wrench};
-
-/// Smallest rise of the normal of a supporting contact, as the sine of its angle from the horizontal.
-const MIN_RISE: f64 = 0.01;
-/// Most rounds in which bodies that rest on falling bodies are let go.
-const ROUNDS: usize = 16;
 
 /// Gives impulses and preloads at rest to the contacts of new bodies, and to those that carry them. The rows must be
 /// written. `substep` is the length of a substep of class 0 (s). Returns the bodies without a balance of forces that
@@ -41,7 +37,7 @@ pub(crate) fn begin(
         return Vec::new();
     }
     let mut structure = Structure::new(world, config, substep, contacts, problem);
-    if !structure.bearings.is_empty() && (0..ROUNDS).any(|_| structure.hand_down(contacts.new_bodies(), problem)) {
+    if !structure.bearings.is_empty() && (0..MAX_ROUNDS).any(|_| structure.hand_down(contacts.new_bodies(), problem)) {
         structure.write(config, substep, contacts, problem);
     }
     structure.unbalanced

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::constants::UNFINISHED;
 use crate::error::{Result, ensure};
 use crate::saved::{Archive, Saved};
 use crate::world::{BodyHandle, JointHandle};
@@ -245,10 +246,6 @@ pub(super) struct Met {
 }
 
 crate::saved::fields!(Met { hit, left });
-
-/// While more than this share of the approach speed remains after a step, the hit waits for the next step before it is
-/// reported.
-const UNFINISHED: f32 = 0.01;
 
 /// The events of the last step, and the state to derive them.
 #[derive(Debug, Default)]
