@@ -3,6 +3,7 @@
 mod boxes;
 mod filter;
 mod shapes;
+mod surface;
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose;

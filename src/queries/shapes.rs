@@ -7,6 +7,7 @@ use parry3d::query::{self, Ray, ShapeCastHit, ShapeCastOptions};
 use parry3d::shape::{HeightField, Shape as ParryShape, Triangle};
 
 use super::boxes::BoxRay;
+use super::surface;
 use crate::world::{Shape, seen_from};
 
 /// Distance and normal at which a ray meets a shape, between the distances `enters` and `most`.
@@ -15,7 +16,12 @@ use crate::world::{Shape, seen_from};
 /// 0.5 m would vanish in rounding.
 pub(super) fn ray(shape: &Shape, pose: &Pose, ray: &BoxRay, [enters, most]: [f32; 2]) -> Option<(f32, Vec3)> {
     let start = begin(&shape.0.compute_aabb(pose), enters);
-    let hit = shape.0.cast_ray_and_get_normal(pose, &Ray::new(ray.at(start), ray.direction), most - start, true)?;
+    let from_start = Ray::new(ray.at(start), ray.direction);
+    if is_surface(&*shape.0) {
+        let (distance, normal) = surface::ray(shape, &from_start.inverse_transform_by(pose), most - start)?;
+        return Some((start + distance, pose.rotation * normal));
+    }
+    let hit = shape.0.cast_ray_and_get_normal(pose, &from_start, most - start, true)?;
     let distance = start + hit.time_of_impact;
     let is_inside = distance == 0.0 || hit.normal == Vec3::ZERO;
     Some((distance, if is_inside { -ray.direction } else { hit.normal }))

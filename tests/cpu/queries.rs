@@ -298,6 +298,46 @@ fn a_shape_that_moves_meets_a_plane_where_its_lowest_point_does() {
 }
 
 #[test]
+fn no_ray_passes_between_the_triangles_of_a_surface() {
+    let mut random = Random::new(7);
+    for rough in [0.0, 0.3] {
+        let rows: Vec<Vec<f32>> = (0..9).map(|_| (0..9).map(|_| rough * random.within(0.0, 1.0)).collect()).collect();
+        let field = Shape::height_field(&rows, Vec3::new(3.0, 1.0, 5.0)).expect("a field");
+        let (corners, triangles) = field.triangles();
+        let mesh = Shape::mesh(corners.clone(), triangles.clone()).expect("a mesh");
+        // Corners, and points of edges, that do not lie on the border.
+        let is_inner = |p: &Vec3| p.x.abs() < 1.49 && p.z.abs() < 2.49;
+        let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let places: Vec<Vec3> = edges
+            .map(|edge| edge.map(|corner| corners[corner as usize]))
+            .flat_map(|[a, b]| [0.0, 0.5, 0.3].map(|share| a + share * (b - a)))
+            .filter(is_inner)
+            .collect();
+        let turn = Quat::from_scaled_axis(Vec3::new(0.3, -0.5, 0.2));
+        for (position, rotation) in [(Vec3::ZERO, Quat::IDENTITY), (Vec3::new(3.0, 5.0, 7.0), turn)] {
+            for shape in [&field, &mesh] {
+                let mut world = World::new();
+                let place = Body::fixed().position(position.x, position.y, position.z).rotation(rotation);
+                world.insert(place.shape(shape.clone()));
+                let queries = Queries::of(&world);
+                for &place in &places {
+                    let mut aside = || Vec3::new(random.within(-1.0, 1.0), 0.0, random.within(-1.0, 1.0));
+                    for from in [Vec3::ZERO, Vec3::X, Vec3::NEG_Z, aside()].map(|aside| place + aside + 2.0 * Vec3::Y) {
+                        let [from, at] = [from, place].map(|p| position + rotation * p);
+                        let hit = queries.ray(from, at - from, 10.0, &Filter::default());
+                        let hit =
+                            hit.unwrap_or_else(|| panic!("{shape:?}: a ray from {from} through {at} meets nothing"));
+                        let excess = hit.distance - from.distance(at);
+                        assert!(excess < 1e-4 && (rough > 0.0 || excess > -1e-4), "{excess} m beyond {at}");
+                        assert!(hit.normal.dot(at - from) < 0.0, "{}", hit.normal);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn the_nearest_surface_has_a_distance_with_a_sign_and_an_outward_normal() {
     let (mut world, floor, ball) = ball_over_floor();
     let field = Shape::height_field(&[vec![0.0; 3], vec![0.0; 3], vec![0.0; 3]], Vec3::splat(2.0)).expect("a field");

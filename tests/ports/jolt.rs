@@ -1570,7 +1570,6 @@ fn rays_from_above_find_the_heights_of_a_field() {
 
 /// Jolt, HeightFieldShapeTests: TestPlane, TestRandomHeightField, without holes and materials.
 #[test]
-#[ignore = "of 900 rays through the samples of a flat field, 88 miss"]
 fn rays_from_above_find_the_samples_of_a_field() {
     assert_eq!(misses(0.0), 0);
 }
