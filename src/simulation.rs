@@ -477,9 +477,10 @@ impl Simulation {
         self.world
     }
 
-    /// Whether a body sleeps; see [`SolverConfig::sleep_after`]. False for an index without a body.
-    pub fn is_asleep(&self, body: usize) -> bool {
-        self.stages.sleep.asleep().get(body) == Some(&true)
+    /// Whether a body sleeps; see [`SolverConfig::sleep_after`]. False if the body is gone.
+    pub fn is_asleep(&self, body: impl Into<BodyHandle>) -> bool {
+        let body = body.into();
+        self.world.bodies.contains(body) && self.asleep().get(body.index()) == Some(&true)
     }
 
     /// The number of the state after the last step, `load` or `restore`. No other state of this process has the same
@@ -493,16 +494,21 @@ impl Simulation {
         self.stages.sleep.asleep()
     }
 
-    /// The number of substeps that a body takes in a step; see [`SolverConfig::max_substeps`]. For an index without a
-    /// body, the smallest number of the world.
-    pub fn substeps_of(&self, body: usize) -> u32 {
-        self.config.substeps << self.stages.effort.class_of(body)
+    /// The number of substeps that a body takes in a step; see [`SolverConfig::max_substeps`]. If the body is gone, the
+    /// smallest number of the world.
+    pub fn substeps_of(&self, body: impl Into<BodyHandle>) -> u32 {
+        let body = body.into();
+        let class = if self.world.bodies.contains(body) { self.stages.effort.class_of(body.index()) } else { 0 };
+        self.config.substeps << class
     }
 
     /// Wakes the island of a body, if the body sleeps. A change of a sleeping body, of gravity or of a joint wakes it
     /// without this call.
-    pub fn wake(&mut self, body: usize) {
-        self.stages.sleep.wake(body);
+    pub fn wake(&mut self, body: impl Into<BodyHandle>) {
+        let body = body.into();
+        if self.world.bodies.contains(body) {
+            self.stages.sleep.wake(body.index());
+        }
     }
 
     /// Overlap of the world at its present poses, from contacts that are computed anew. The call does not change the

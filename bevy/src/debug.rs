@@ -40,9 +40,10 @@ pub enum DebugLine {
 pub fn debug_lines(physics: &Physics) -> Vec<(DebugLine, [Vec3; 2])> {
     let (simulation, world) = (&physics.simulation, &physics.simulation.world);
     let mut lines = Vec::new();
-    for (index, body) in world.bodies.iter().enumerate() {
+    for handle in world.bodies.handles() {
+        let body = &world.bodies[handle.index()];
         for collider in &body.colliders {
-            let kind = match (collider.sensor, simulation.is_asleep(index)) {
+            let kind = match (collider.sensor, simulation.is_asleep(handle)) {
                 (true, _) => DebugLine::Sensor,
                 (_, true) => DebugLine::Sleeping,
                 _ => DebugLine::Shape,

@@ -28,7 +28,7 @@ pub(crate) fn register(app: &mut App) {
     });
     app.add_observer(|removed: On<Remove<Sleeping>>, mut physics: ResMut<Physics>| {
         if let Some(body) = physics.handle(removed.entity) {
-            physics.simulation.wake(body.index());
+            physics.simulation.wake(body);
         }
     });
     let world = app.world_mut();

@@ -52,7 +52,7 @@ pub(crate) fn write(
         }
         linear.set_if_neq(LinearVelocity(now.linear));
         angular.set_if_neq(AngularVelocity(now.angular));
-        match (simulation.is_asleep(index), sleeping) {
+        match (simulation.is_asleep(row.handle), sleeping) {
             (true, false) => drop(commands.entity(row.entity).try_insert(Sleeping)),
             (false, true) => drop(commands.entity(row.entity).try_remove::<Sleeping>()),
             _ => {}

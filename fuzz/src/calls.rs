@@ -229,7 +229,7 @@ impl Game {
             }
             Call::Wake(k) => {
                 let Some(handle) = self.body(*k) else { return };
-                self.runs.each(|simulation| simulation.wake(handle.index()));
+                self.runs.each(|simulation| simulation.wake(handle));
             }
             Call::Ray(from, along, most) => {
                 let queries = self.runs.first().queries();

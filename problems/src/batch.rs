@@ -145,7 +145,7 @@ impl Measure {
             Self::Need => member.stats().hardest.map_or(0.0, |hardest| f64::from(hardest.need)),
             Self::EnergyTaken => member.stats().energy_taken,
             Self::Contacts => member.simulation().contacts().count() as f64,
-            Self::Asleep => (0..world.bodies.len()).filter(|&i| member.simulation().is_asleep(i)).count() as f64,
+            Self::Asleep => world.bodies.handles().filter(|&body| member.simulation().is_asleep(body)).count() as f64,
             Self::ResidualVelocity => residual(|all| all.e_vel),
             Self::ResidualCone => residual(|all| all.cone),
             Self::ResidualComplementarity => residual(|all| all.compl),

@@ -320,9 +320,10 @@ impl Batch {
         let columns = exists.as_slice_mut()?.iter_mut().zip(asleep.as_slice_mut()?).zip(substeps.as_slice_mut()?);
         for (k, ((exists, asleep), substeps)) in columns.enumerate() {
             let (simulation, body) = (batch.world(k / each).simulation(), k % each);
-            *exists = body < simulation.world.bodies.len() && !simulation.world.bodies.is_vacant(body);
-            *asleep = simulation.is_asleep(body);
-            *substeps = if *exists { simulation.substeps_of(body) } else { 0 };
+            let body = simulation.world.bodies.handle(body);
+            *exists = body.is_some();
+            *asleep = body.is_some_and(|body| simulation.is_asleep(body));
+            *substeps = body.map_or(0, |body| simulation.substeps_of(body));
         }
         Ok(())
     }

@@ -33,7 +33,7 @@ impl StepInput {
         if let Some(config) = &self.config {
             simulation.set_config(config.clone())?;
         }
-        self.woken.iter().for_each(|&body| simulation.wake(body as usize));
+        self.woken.iter().for_each(|&body| simulation.stages.sleep.wake(body as usize));
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use drystone::{BodyKind, Error, Result, Simulation, SolvedManifold, World};
+use drystone::{BodyHandle, BodyKind, Error, Result, Simulation, SolvedManifold, World};
 
 /// The quantity that the color of a body shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,9 +93,10 @@ impl ColorBy {
     pub fn values(self, simulation: &mut Simulation) -> Vec<f32> {
         if self == Self::Effort {
             let doubled = |body| (simulation.substeps_of(body) / simulation.config().substeps).ilog2() as f32;
-            return (0..simulation.world.bodies.len()).map(doubled).collect();
+            return handles(&simulation.world).map(|body| body.map_or(0.0, doubled)).collect();
         }
-        let asleep: Vec<bool> = (0..simulation.world.bodies.len()).map(|i| simulation.is_asleep(i)).collect();
+        let asleep = |body: Option<BodyHandle>| body.is_some_and(|body| simulation.is_asleep(body));
+        let asleep: Vec<bool> = handles(&simulation.world).map(asleep).collect();
         let manifolds: Vec<SolvedManifold> = simulation.manifolds().collect();
         self.values_of(&simulation.world, &manifolds, &asleep)
     }
@@ -151,6 +152,11 @@ impl ColorBy {
         };
         world.bodies.iter().zip(values).enumerate().map(color).collect()
     }
+}
+
+/// The handle of each body; `None` for a vacancy.
+fn handles(world: &World) -> impl Iterator<Item = Option<BodyHandle>> {
+    (0..world.bodies.len()).map(|index| world.bodies.handle(index))
 }
 
 /// The number of each dynamic body's material, in the order of first occurrence.

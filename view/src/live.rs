@@ -14,7 +14,7 @@ use crate::show::Pointer;
 use drystone::backend::{BackendChoice, choose};
 use drystone::queries::Filter;
 use drystone::{
-    Backend, Body, BodyKind, Cpu, JointHandle, Result, Shape, Simulation, Snapshot, SolverConfig, StepStats,
+    Backend, Body, BodyHandle, BodyKind, Cpu, JointHandle, Result, Shape, Simulation, Snapshot, SolverConfig, StepStats,
 };
 use drystone_scenes::{Driver, Replay, Scene, Spawners};
 
@@ -81,7 +81,7 @@ pub struct Live {
 
 /// A body that the pointer pulls through a joint to the world.
 pub(crate) struct Grabbed {
-    pub(crate) body: usize,
+    pub(crate) body: BodyHandle,
     /// The pulled point in the body's frame (m).
     pub(crate) anchor: Vec3,
     /// Distance of the target from the eye (m).
@@ -407,7 +407,7 @@ impl Live {
         // When a body is removed, its joint is gone too.
         self.grabbed = self.grabbed.take().filter(|grabbed| world.joint(grabbed.joint).is_some());
         if let Some(grabbed) = &self.grabbed {
-            let body = &world.bodies[grabbed.body];
+            let body = &world.bodies[grabbed.body.index()];
             let at = body.position + body.rotation * grabbed.anchor;
             if let Some(joint) = world.joint_mut(grabbed.joint) {
                 joint.anchor_b = at + (grabbed.target - at) * (PULL * dt).min(1.0);
@@ -527,7 +527,7 @@ mod tests {
         live.release();
         assert!(live.grab(&above(&live, top - 3)));
         let grabbed = live.grabbed.as_ref().expect("a body").body;
-        assert_eq!(grabbed, top - 3);
+        assert_eq!(grabbed.index(), top - 3);
         for _ in 0..30 {
             step(&mut live);
             let world = live.world();

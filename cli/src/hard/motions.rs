@@ -194,7 +194,7 @@ pub(super) fn ragdolls(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let mut simulation = setup.sleeping(Scene::find("ragdolls", &[])?.world)?;
     let speeds = watch(&mut simulation, 300, |world| metrics::fastest(world).0)?;
     checks.at_most("speed in the fifth second [m/s]", largest(LEAST, speeds[240..].iter().copied()), 0.05);
-    let asleep = (0..simulation.world.bodies.len()).filter(|&body| simulation.is_asleep(body)).count();
+    let asleep = simulation.world.bodies.handles().filter(|&body| simulation.is_asleep(body)).count();
     checks.at_most("parts awake after 5 s", (simulation.world.dynamic_count() - asleep) as f64, 0.0);
     Ok(())
 }
