@@ -1,7 +1,7 @@
 //! The constants of the solver that are judgments. Settings, limits of numbers, sizes of tasks and tolerances of
 //! geometry stand where they belong.
 //!
-//! None is a length, a speed or a mass. [docs/robust.md](../docs/robust.md) has the effect of a change by 30 %.
+//! None is a length, a speed or a mass. docs/robust.md has the effect of a change by 30 %.
 
 // Bodies that begin at rest: src/rest.
 
@@ -10,9 +10,7 @@ pub const MIN_RISE: f64 = 0.01;
 /// Stiffness of single points, and of friction, relative to that of whole manifolds. A manifold has one preload, so its
 /// points should carry equal loads where they can.
 pub const POINT_STIFFNESS: f64 = 0.02;
-/// The share of its limit to which friction beyond the limit falls in a round.
-pub const FRICTION_LEFT: f64 = 0.9;
-/// The share of a load that may stay unbalanced.
+/// The share of a load that may stay unbalanced, and by which friction may exceed its limit.
 pub const UNBALANCED: f64 = 1e-4;
 /// Stiffness against motions that no point resists, relative to the largest stiffness.
 pub const NO_RESISTANCE: f64 = 1e-10;

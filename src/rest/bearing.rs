@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::constants::{FRICTION_LEFT, MAX_ROUNDS, NO_FORCE, NO_RESISTANCE, POINT_STIFFNESS, UNBALANCED};
+use crate::constants::{MAX_ROUNDS, NO_FORCE, NO_RESISTANCE, POINT_STIFFNESS, UNBALANCED};
 
 /// A force and its moment about a center of mass (N, N m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -151,8 +151,8 @@ impl Balance {
         }
         for ((spring, force), point) in self.springs.iter_mut().zip(&self.forces).zip(points) {
             let (slip, limit) = (libm::hypot(force[1], force[2]), point.friction * force[0]);
-            if slip > limit + NO_FORCE * most {
-                spring.slip *= FRICTION_LEFT * limit / slip;
+            if slip > (1.0 + UNBALANCED) * limit + NO_FORCE * most {
+                spring.slip *= limit / slip;
                 are_within = false;
             }
         }
