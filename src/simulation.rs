@@ -479,8 +479,7 @@ impl Simulation {
 
     /// Whether a body sleeps; see [`SolverConfig::sleep_after`]. False if the body is gone.
     pub fn is_asleep(&self, body: impl Into<BodyHandle>) -> bool {
-        let body = body.into();
-        self.world.bodies.contains(body) && self.asleep().get(body.index()) == Some(&true)
+        self.world.bodies.index_of(body.into()).is_some_and(|index| self.asleep().get(index) == Some(&true))
     }
 
     /// The number of the state after the last step, `load` or `restore`. No other state of this process has the same
@@ -497,17 +496,15 @@ impl Simulation {
     /// The number of substeps that a body takes in a step; see [`SolverConfig::max_substeps`]. If the body is gone, the
     /// smallest number of the world.
     pub fn substeps_of(&self, body: impl Into<BodyHandle>) -> u32 {
-        let body = body.into();
-        let class = if self.world.bodies.contains(body) { self.stages.effort.class_of(body.index()) } else { 0 };
-        self.config.substeps << class
+        let index = self.world.bodies.index_of(body.into());
+        self.config.substeps << index.map_or(0, |index| self.stages.effort.class_of(index))
     }
 
     /// Wakes the island of a body, if the body sleeps. A change of a sleeping body, of gravity or of a joint wakes it
     /// without this call.
     pub fn wake(&mut self, body: impl Into<BodyHandle>) {
-        let body = body.into();
-        if self.world.bodies.contains(body) {
-            self.stages.sleep.wake(body.index());
+        if let Some(index) = self.world.bodies.index_of(body.into()) {
+            self.stages.sleep.wake(index);
         }
     }
 

@@ -18,8 +18,8 @@ pub(super) fn ray(shape: &Shape, pose: &Pose, ray: &BoxRay, [enters, most]: [f32
     let start = begin(&shape.0.compute_aabb(pose), enters);
     let from_start = Ray::new(ray.at(start), ray.direction);
     if is_surface(&*shape.0) {
-        let (distance, normal) = surface::ray(shape, &from_start.inverse_transform_by(pose), most - start)?;
-        return Some((start + distance, pose.rotation * normal));
+        let hit = surface::ray(shape, &from_start.inverse_transform_by(pose), most - start)?;
+        return Some((start + hit.time_of_impact, pose.rotation * hit.normal));
     }
     let hit = shape.0.cast_ray_and_get_normal(pose, &from_start, most - start, true)?;
     let distance = start + hit.time_of_impact;

@@ -2,33 +2,37 @@
 //! through, of rays through the corners of a flat field every tenth.
 
 use glam::{DVec3, Vec3, Vec4};
+use parry3d::bounding_volume::BoundingVolume;
 use parry3d::partitioning::BvhNode;
-use parry3d::query::Ray;
-use parry3d::shape::{HeightField, Triangle};
+use parry3d::query::{Ray, RayIntersection};
+use parry3d::shape::{FeatureId, HeightField, TriMesh, Triangle};
 
 use super::boxes::BoxRay;
 use crate::world::Shape;
 
-/// Cells are this much larger than they are (of the extent of a field): the pose of a field rounds the ray.
+/// Boxes and cells are this much larger than they are, relative to their places and that of the ray: the pose of a
+/// shape rounds the ray.
 const WIDER: f32 = 4.0 * f32::EPSILON;
 
-/// Distance and normal at which a ray in the frame of a mesh or height field meets it within the distance `most`. The
-/// direction has unit length.
-pub(super) fn ray(shape: &Shape, ray: &Ray, most: f32) -> Option<(f32, Vec3)> {
-    if let Some(mesh) = shape.0.as_trimesh() {
-        let aabb = mesh.local_aabb();
-        let wider =
-            WIDER * [ray.origin, aabb.mins, aabb.maxs].map(|p| p.abs().max_element()).into_iter().fold(0.0, f32::max);
-        let boxes = BoxRay::new(ray.origin, ray.dir, Vec3::splat(wider))?;
-        let enters = |node: &BvhNode, _| {
-            let [mins, maxs] = [node.mins(), node.maxs()].map(|corner| corner.to_array().map(Vec4::splat));
-            boxes.enters(&mins, &maxs).x
-        };
-        let meets = |number: u32, most: f32| Some(of_triangle(&mesh.triangle(number), ray, most)?.0);
-        let (number, _) = mesh.bvh().find_best(most, enters, meets)?;
-        return of_triangle(&mesh.triangle(number), ray, most);
+/// Where a ray in the frame of a mesh or height field meets it within the distance `most`. The direction has unit length.
+pub(super) fn ray(shape: &Shape, ray: &Ray, most: f32) -> Option<RayIntersection> {
+    let aabb = shape.0.compute_local_aabb();
+    let places = [ray.origin, aabb.mins, aabb.maxs].map(|p| p.abs().max_element());
+    let wider = WIDER * places.into_iter().fold(0.0, f32::max);
+    match shape.0.as_trimesh() {
+        Some(mesh) => of_mesh(mesh, ray, most, wider),
+        None => of_field(shape.0.as_heightfield()?, ray, most, wider),
     }
-    of_field(shape.0.as_heightfield()?, ray, most)
+}
+
+fn of_mesh(mesh: &TriMesh, ray: &Ray, most: f32, wider: f32) -> Option<RayIntersection> {
+    let boxes = BoxRay::new(ray.origin, ray.dir, Vec3::splat(wider))?;
+    let enters = |node: &BvhNode, _| {
+        let [mins, maxs] = [node.mins(), node.maxs()].map(|corner| corner.to_array().map(Vec4::splat));
+        boxes.enters(&mins, &maxs).x
+    };
+    let meets = |number: u32, most: f32| of_triangle(&mesh.triangle(number), ray, most);
+    mesh.bvh().find_best(most, enters, meets).map(|(_, hit)| hit)
 }
 
 /// The numbers of `count` intervals of the length `step`, from `first` on, that the interval from `a` to `b` meets, in
@@ -39,44 +43,30 @@ fn met([a, b]: [f32; 2], first: f32, step: f32, count: usize, wider: f32) -> imp
     (0..=high - low).map(move |k| if a <= b { low + k } else { high - k })
 }
 
-fn of_field(field: &HeightField, ray: &Ray, most: f32) -> Option<(f32, Vec3)> {
-    let wider = WIDER * (ray.origin.abs().max_element() + field.scale().abs().max_element());
-    let aabb = field.local_aabb();
-    let (columns, rows) = (field.ncols(), field.nrows());
-    let (first, step) =
-        (Vec3::new(field.x_at(0), 0.0, field.z_at(0)), Vec3::new(field.cell_width(), 0.0, field.cell_height()));
-    // Where the ray is in the box of the field.
-    let (mut from, mut to) = (0.0_f32, most);
-    for axis in 0..3 {
-        let (x, speed) = (ray.origin[axis], ray.dir[axis]);
-        let (low, high) = (aabb.mins[axis] - wider, aabb.maxs[axis] + wider);
-        if speed == 0.0 {
-            if x < low || x > high {
-                return None;
-            }
-            continue;
-        }
-        let (enters, leaves) = ((low - x) / speed, (high - x) / speed);
-        (from, to) = (from.max(enters.min(leaves)), to.min(enters.max(leaves)));
-    }
+fn of_field(field: &HeightField, ray: &Ray, most: f32, wider: f32) -> Option<RayIntersection> {
+    let (from, to) = field.local_aabb().loosened(wider).clip_ray_parameters(ray)?;
+    let to = to.min(most);
     if from > to {
         return None;
     }
-    let mut best: Option<(f32, Vec3)> = None;
     let at = |t: f32| ray.origin + t * ray.dir;
-    for column in met([at(from).x, at(to).x], first.x, step.x, columns, wider) {
+    let (left, top, width, height) = (field.x_at(0), field.z_at(0), field.cell_width(), field.cell_height());
+    let mut best: Option<RayIntersection> = None;
+    for column in met([at(from).x, at(to).x], left, width, field.ncols(), wider) {
         // The part of the ray over this column.
-        let x = first.x + step.x * column as f32;
-        let over = [x - wider, x + step.x + wider].map(|x| (x - ray.origin.x) / ray.dir.x);
-        let (enters, leaves) =
-            if ray.dir.x == 0.0 { (from, to) } else { (over[0].min(over[1]).max(from), over[0].max(over[1]).min(to)) };
-        if best.is_some_and(|(distance, _)| distance < enters) {
+        let (mut enters, mut leaves) = (from, to);
+        if ray.dir.x != 0.0 {
+            let x = left + width * column as f32;
+            let [a, b] = [x - wider, x + width + wider].map(|x| (x - ray.origin.x) / ray.dir.x);
+            (enters, leaves) = (a.min(b).max(from), a.max(b).min(to));
+        }
+        if best.is_some_and(|hit| hit.time_of_impact < enters) {
             break;
         }
-        for row in met([at(enters).z, at(leaves).z], first.z, step.z, rows, wider) {
+        for row in met([at(enters).z, at(leaves).z], top, height, field.nrows(), wider) {
             let (left, right) = field.triangles_at(row, column);
             for triangle in left.iter().chain(&right) {
-                let nearest = best.map_or(most, |(distance, _)| distance);
+                let nearest = best.map_or(most, |hit| hit.time_of_impact);
                 best = of_triangle(triangle, ray, nearest).or(best);
             }
         }
@@ -84,11 +74,11 @@ fn of_field(field: &HeightField, ray: &Ray, most: f32) -> Option<(f32, Vec3)> {
     best
 }
 
-/// Distance and normal at which a ray meets a triangle within the distance `most`. The normal points against the ray.
+/// Where a ray meets a triangle within the distance `most`. The normal points against the ray.
 ///
 /// The volume that the ray spans with an edge has the opposite sign, to the last bit, for the other triangle at this
 /// edge, so that no ray passes between them (Woop, Benthin and Wald, Watertight Ray/Triangle Intersection, 2013).
-fn of_triangle(triangle: &Triangle, ray: &Ray, most: f32) -> Option<(f32, Vec3)> {
+fn of_triangle(triangle: &Triangle, ray: &Ray, most: f32) -> Option<RayIntersection> {
     let (origin, direction) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let [a, b, c] = [triangle.a, triangle.b, triangle.c].map(|corner| corner.as_dvec3() - origin);
     let volume = |p: DVec3, q: DVec3| direction.dot(p.cross(q));
@@ -105,5 +95,5 @@ fn of_triangle(triangle: &Triangle, ray: &Ray, most: f32) -> Option<(f32, Vec3)>
     }
     let normal = (b - a).cross(c - a).normalize();
     let against = if normal.dot(direction) > 0.0 { -normal } else { normal };
-    Some((distance.max(0.0) as f32, against.as_vec3()))
+    Some(RayIntersection::new(distance.max(0.0) as f32, against.as_vec3(), FeatureId::Unknown))
 }

@@ -256,6 +256,11 @@ impl Bodies {
         self.generations.get(handle.index()) == Some(&handle.generation) && handle.tag.fits(self.tag)
     }
 
+    /// The index of the body that the handle names, if it is still in this world.
+    pub(crate) fn index_of(&self, handle: BodyHandle) -> Option<usize> {
+        self.contains(handle).then_some(handle.index())
+    }
+
     /// Converts a handle of `other` after `other` was appended at index `first`. The result names no body if the handle
     /// names none in `other`.
     pub(super) fn appended(&self, body: BodyHandle, first: usize, other: &Self) -> BodyHandle {

@@ -157,12 +157,12 @@ impl World {
 
     /// A body, or `None` if it is gone.
     pub fn body(&self, body: BodyHandle) -> Option<&Body> {
-        self.bodies.contains(body).then(|| &self.bodies[body.index()])
+        self.bodies.index_of(body).map(|index| &self.bodies[index])
     }
 
     /// A mutable body, or `None` if it is gone.
     pub fn body_mut(&mut self, body: BodyHandle) -> Option<&mut Body> {
-        self.bodies.contains(body).then(|| &mut self.bodies[body.index()])
+        self.bodies.index_of(body).map(|index| &mut self.bodies[index])
     }
 
     /// Adds a joint and returns its index. [`World::insert_joint`] returns its handle instead.

@@ -55,8 +55,8 @@ impl Target {
     }
 
     /// Number of dispatches that the host encodes before it sends them. Hardware runs them while the host encodes the
-    /// next; a software adapter needs the same processors for both. On an NVIDIA H200, a step of a pile of 1,000 takes
-    /// 1.6 ms with 32 or 64, 1.7 with 128 and 1.9 with all at once.
+    /// next; a software adapter needs the same processors for both. On an NVIDIA H200, stage `run` of a pile of
+    /// 1,000 takes 1.6 ms with 32 or 64, 1.7 with 128 and 1.9 with all at once.
     pub fn dispatches_at_once(self) -> usize {
         match self {
             Self::Hardware => 64,
