@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The modules of the engine on each floor, the ground floor first.
 const LIBRARY: &[&[&str]] = &[
-    &["math", "lanes", "random", "error", "memory", "names", "panics", "saved", "stats", "suggest"],
+    &["constants", "math", "lanes", "random", "error", "memory", "names", "panics", "saved", "stats", "suggest"],
     &["world", "config", "preset"],
     &["collide", "graph"],
     &["effort", "queries", "load"],
