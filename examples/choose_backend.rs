@@ -17,7 +17,7 @@ fn main() -> Result<()> {
     for _ in 0..60 {
         let stats = simulation.step(scene.dt)?;
         if let Some(body) = stats.first_non_finite {
-            println!("body {body} left the finite range");
+            println!("body {} left the finite range", body.index());
         }
     }
     println!("kinetic energy after 1 s: {:.1} J", simulation.world.kinetic_energy());

@@ -12,7 +12,7 @@ pub fn main() -> Result<()> {
     for i in 0..5 {
         let (x, z) = (0.3 * i as f32 - 0.6, 0.1 * i as f32);
         let velocity = Vec3::new(0.1 * (i as f32 - 2.0), 0.0, 0.0);
-        world.add(
+        world.insert(
             Body::dynamic().shape(Shape::ball(0.1)).position(x, 2.0 + 0.4 * i as f32, z).velocity(velocity, Vec3::ZERO),
         );
     }

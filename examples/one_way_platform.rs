@@ -34,7 +34,7 @@ pub fn run(print: &mut dyn FnMut(String)) -> Result<()> {
     let mut world = World::new();
     let platform = Body::fixed().shape(Shape::cuboid(5.0, 0.1, 1.0)).position(0.0, TOP - 0.1, 0.0);
     let platform = world.insert(platform);
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     let throw = |speed: f32| {
         let ball = Body::dynamic().shape(Shape::ball(RADIUS)).position(speed - 6.0, RADIUS, 0.0);
         ball.velocity(Vec3::Y * speed, Vec3::ZERO)

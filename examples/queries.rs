@@ -15,9 +15,9 @@ pub fn run(mut print: impl FnMut(String)) -> Result<()> {
     let floor = world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).named("floor"));
     for (i, (half, y)) in [(0.6, 0.6), (0.5, 1.7), (0.4, 2.6)].into_iter().enumerate() {
         let box_of_wood = Body::dynamic().shape(Shape::cuboid(half, half, half)).named(format!("crate {i}"));
-        world.add(box_of_wood.position(2.0, y, 0.0));
+        world.insert(box_of_wood.position(2.0, y, 0.0));
     }
-    world.add(Body::dynamic().shape(Shape::ball(0.4)).position(-2.0, 0.4, 0.0).named("ball"));
+    world.insert(Body::dynamic().shape(Shape::ball(0.4)).position(-2.0, 0.4, 0.0).named("ball"));
     let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     for _ in 0..60 {
         simulation.step(1.0 / 60.0)?;

@@ -12,7 +12,8 @@ fn main() -> Result<()> {
         simulation.step(scene.dt)?;
     }
     for manifold in simulation.manifolds() {
-        println!("body {} on body {}, normal {:.2}", manifold.body_b, manifold.body_a, manifold.normal);
+        let [a, b] = [manifold.a, manifold.b].map(|side| side.body.index());
+        println!("body {b} on body {a}, normal {:.2}", manifold.normal);
         // Impulses are those of the last substep: over its length they are forces.
         let substep = scene.dt / manifold.substeps as f32;
         for point in manifold.points() {

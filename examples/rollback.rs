@@ -12,10 +12,10 @@ const LATE: usize = 4;
 
 fn game() -> Result<Simulation> {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).named("floor"));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).named("floor"));
     for i in 0..10 {
         let place = Vec3::new((i % 2) as f32 * 3.0, 0.5 + (i / 2) as f32, 0.0);
-        world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(place.x, place.y, place.z));
+        world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(place.x, place.y, place.z));
     }
     Simulation::new(world)
 }

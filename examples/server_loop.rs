@@ -28,7 +28,7 @@ fn main() -> Result<()> {
 /// Runs for a number of steps.
 pub fn run(steps: u32, mut send: impl FnMut(String)) -> Result<()> {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.3));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.3));
     let puck =
         |x: f32| Body::dynamic().shape(Shape::cylinder(0.2, 0.5)).total_mass(10.0).position(x, 0.2, 0.0).friction(0.3);
     let players: Vec<BodyHandle> = [-3.0, 3.0].map(|x| world.insert(puck(x))).into();

@@ -16,7 +16,7 @@ fn main() -> Result<()> {
 
 pub fn run(mut print: impl FnMut(String)) -> Result<()> {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::cuboid(4.0, 0.5, 4.0)).position(0.0, -0.5, 0.0).named("basin"));
+    world.insert(Body::fixed().shape(Shape::cuboid(4.0, 0.5, 4.0)).position(0.0, -0.5, 0.0).named("basin"));
     let mut simulation = Simulation::new(world)?;
     let mut balls: VecDeque<BodyHandle> = VecDeque::new();
     for step in 0..480 {

@@ -25,7 +25,7 @@ use crate::graph::{IMMOVABLE, Islands};
 use crate::load::Load;
 use crate::saved::{Archive, Saved};
 use crate::stats::EFFORT_CLASSES;
-use crate::world::{Body, BodyKind, World};
+use crate::world::{Body, BodyHandle, BodyKind, World};
 use island::{HIGHEST, Island};
 
 /// A contact or joint, for the effort of its island.
@@ -197,7 +197,7 @@ impl Effort {
         if any_unbalanced {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
             self.unbalanced.retain(|&body| {
-                let speeds = config.sleep_speed..FALL * world.gravity_on(body as usize).length();
+                let speeds = config.sleep_speed..FALL * world.gravity_at(body as usize).length();
                 speeds.contains(&of_root[islands.root(body) as usize].fastest)
             });
         }
@@ -242,13 +242,14 @@ impl Effort {
     fn begin(&mut self, world: &World, config: &SolverConfig, dt: f32) {
         // The bounding boxes of neighboring bodies may overlap.
         let touches =
-            |upper: usize, gap: f64| gap.abs() < LEVEL * f64::from(world.bodies[upper].smallest_half_extent());
-        let is_dynamic = |body: usize| world.bodies[body].kind == BodyKind::Dynamic;
+            |upper: BodyHandle, gap: f64| gap.abs() < LEVEL * f64::from(world.bodies[upper].smallest_half_extent());
+        let is_dynamic = |body: BodyHandle| world.bodies[body].kind == BodyKind::Dynamic;
         let interface = |load: &Load| {
             let size = [load.upper, load.lower].map(|body| world.bodies[body].smallest_half_extent());
             let sag = load.overlap(config.substeps, dt, config);
             let need = sag / f64::from(config.promised_sag(size[0].min(size[1])));
-            let [a, b] = [load.upper, load.lower].map(|body| if is_dynamic(body) { body as u32 } else { IMMOVABLE });
+            let [a, b] =
+                [load.upper, load.lower].map(|body| if is_dynamic(body) { body.index() as u32 } else { IMMOVABLE });
             // Statics finds true loads, so no limit applies.
             Interface { a, b, need: need as f32, force: 0.0, joint: None }
         };
@@ -288,7 +289,7 @@ impl Effort {
             island.descent_steps = island.descent_steps.min(self.descent_steps[i]);
             island.fastest = island.fastest.max(body.linear_velocity.length());
             if is_dynamic {
-                island.load += load_of(body, world.gravity_on(i), dt);
+                island.load += load_of(body, world.gravity_at(i), dt);
             }
         }
         let body_of = |a: u32, b: u32| Some(if a == IMMOVABLE { b } else { a }).filter(|&body| body != IMMOVABLE);

@@ -748,7 +748,7 @@ mod tests {
     fn balls_that_part_keep_a_quarter_of_their_energy_and_the_momentum_of_the_start() {
         let mut world = World::new();
         for x in [-1.0, 1.0] {
-            world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(1.0).position(x, 0.0, 0.0));
+            world.insert(Body::dynamic().shape(Shape::ball(0.1)).total_mass(1.0).position(x, 0.0, 0.0));
         }
         for drift in [None, Some(3.0_f64)] {
             let row = |x: f32| BodyRow { v: [x, 0.0, 0.0], ..BodyRow::AT_REST };

@@ -16,7 +16,7 @@ use crate::config::{SolverConfig, Stabilization};
 use crate::constants::LEVEL;
 use crate::error::{Error, Result, input};
 use crate::math::rotation::product;
-use crate::world::{Body, BodyKind, World, placed, pose};
+use crate::world::{Body, BodyHandle, BodyKind, World, placed, pose};
 
 /// Largest number of substeps that the settings accept.
 const MAX_SUBSTEPS: f64 = 4096.0;
@@ -26,9 +26,9 @@ const MAX_SUBSTEPS: f64 = 4096.0;
 /// use drystone::{Body, Shape, SolverConfig, World, glam::Vec3, load::Load};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// for k in 0..3 {
-///     world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + k as f32, 0.0));
+///     world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + k as f32, 0.0));
 /// }
 /// let config = SolverConfig::default();
 /// let interfaces = Load::all(&world, &config, |_, _| true);
@@ -44,9 +44,9 @@ const MAX_SUBSTEPS: f64 = 4096.0;
 #[non_exhaustive]
 pub struct Load {
     /// The upper body.
-    pub upper: usize,
+    pub upper: BodyHandle,
     /// The body that supports it.
-    pub lower: usize,
+    pub lower: BodyHandle,
     /// Force between the two (N).
     pub force: f64,
     /// Overlap times the square of w (m/s²): the force on one point over its effective mass.
@@ -69,7 +69,7 @@ impl Load {
 
     /// The wanted interfaces of `world`, with loads as in [`Self::heaviest`]. `is_wanted` gets the upper body and the
     /// gap of each (m).
-    pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(usize, f64) -> bool) -> Vec<Self> {
+    pub fn all(world: &World, config: &SolverConfig, is_wanted: impl Fn(BodyHandle, f64) -> bool) -> Vec<Self> {
         let ups: Vec<DMat3> = (0..world.world_count()).map(|part| up(world.gravity_of(part))).collect();
         let up_of = |i: usize| ups[world.bodies.worlds()[i] as usize];
         let boxes = upright_boxes(world, up_of);
@@ -91,9 +91,10 @@ impl Load {
                 let force = borne[upper] * area / total;
                 borne[lower] += force;
                 let gap = boxes[upper].low.y - boxes[lower].high.y;
-                if is_wanted(upper, gap) {
+                let [Some(above), Some(below)] = [upper, lower].map(|body| world.bodies.handle(body)) else { continue };
+                if is_wanted(above, gap) {
                     let stress = stress(world, (&boxes, up_of(upper)), upper, lower, force, config);
-                    all.push(Self { upper, lower, force, stress, gap });
+                    all.push(Self { upper: above, lower: below, force, stress, gap });
                 }
             }
         }
@@ -118,7 +119,7 @@ impl Load {
         if substeps <= MAX_SUBSTEPS {
             return Ok(substeps as u32);
         }
-        let (upper, lower, force) = (self.upper, self.lower, self.force);
+        let (upper, lower, force) = (self.upper.index(), self.lower.index(), self.force);
         Err(input!(
             "penetration of {:.3e} mm: body {upper} presses on body {lower} with {force:.3e} N, which asks for {substeps} \
              substeps, more than {MAX_SUBSTEPS}; shorten the step",
@@ -223,8 +224,8 @@ struct Ground<'a> {
 
 impl<'a> Ground<'a> {
     fn new(boxes: &'a [Box3], world: &'a World) -> Self {
-        let tree = |mut own: Vec<usize>| {
-            own.retain(|&i| !boxes[i].is_empty());
+        let tree = |own: Vec<BodyHandle>| {
+            let own: Vec<usize> = own.into_iter().map(BodyHandle::index).filter(|&i| !boxes[i].is_empty()).collect();
             // parry assumes that a tree with one or two leaves has the leaves 0 and 1.
             let leaves = own.iter().map(|&i| aabb(boxes[i].low, boxes[i].high)).enumerate();
             (Bvh::from_iter(BvhBuildStrategy::Binned, leaves), own)
@@ -289,7 +290,7 @@ mod tests {
             assert!(Load::heaviest(&world, &SolverConfig::default()).is_none());
             world.insert(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
             let load = Load::heaviest(&world, &SolverConfig::default()).expect("a load");
-            assert_eq!((load.upper, load.lower), (gone + 1, gone));
+            assert_eq!([load.upper, load.lower].map(BodyHandle::index), [gone + 1, gone]);
         }
     }
 
@@ -302,12 +303,13 @@ mod tests {
         for height in [3.0, 30.0, 300.0, 3000.0].repeat(50) {
             let half = number(0.01, 1.0);
             let at = [number(-3.0, 3.0), number(0.0, height), number(-3.0, 3.0)];
-            world
-                .add(Body::dynamic().shape(crate::Shape::cuboid(half, 0.3 * half, half)).position(at[0], at[1], at[2]));
+            world.insert(
+                Body::dynamic().shape(crate::Shape::cuboid(half, 0.3 * half, half)).position(at[0], at[1], at[2]),
+            );
         }
         // So far away that rounding leaves boxes without a height.
         for y in [1e12, 1.1e12, 1e20, 1.1e20] {
-            world.add(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, y, 0.0));
+            world.insert(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, y, 0.0));
         }
         let boxes = upright_boxes(&world, |_| up(world.gravity));
         let ground = Ground::new(&boxes, &world);
@@ -328,8 +330,8 @@ mod tests {
     fn a_world_has_loads_whatever_the_indices_of_its_bodies() {
         let pair = |world: &mut World| {
             let floor = crate::Shape::cuboid(1.0, 0.5, 1.0);
-            world.add(Body::fixed().shape(floor.clone()).position(0.0, -0.5, 0.0));
-            world.add(Body::dynamic().shape(floor).position(0.0, 0.5, 0.0));
+            world.insert(Body::fixed().shape(floor.clone()).position(0.0, -0.5, 0.0));
+            world.insert(Body::dynamic().shape(floor).position(0.0, 0.5, 0.0));
         };
         let (mut one, mut world) = (World::new(), World::new());
         pair(&mut one);
@@ -338,23 +340,27 @@ mod tests {
         world.remove(gone);
         world.beside(&one);
         let loads = Load::all(&world, &SolverConfig::default(), |_, _| true);
-        assert_eq!(loads.iter().map(|load| (load.upper, load.lower)).collect::<Vec<_>>(), [(2, 1), (4, 3)]);
+        let pairs = loads.iter().map(|load| [load.upper, load.lower].map(BodyHandle::index));
+        assert_eq!(pairs.collect::<Vec<_>>(), [[2, 1], [4, 3]]);
     }
 
     #[test]
     fn gravity_may_point_anywhere_and_a_floor_may_be_a_half_space() {
         let mut world = World::new();
         world.gravity = glam::Vec3::new(9.81, 0.0, 0.0);
-        world.add(Body::fixed().shape(crate::Shape::half_space(glam::Vec3::NEG_X)));
+        world.insert(Body::fixed().shape(crate::Shape::half_space(glam::Vec3::NEG_X)));
         for x in [-0.5, -1.5] {
-            world.add(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(x, 3.0, 0.0));
+            world.insert(Body::dynamic().shape(crate::Shape::cuboid(0.5, 0.5, 0.5)).position(x, 3.0, 0.0));
         }
         let load = Load::heaviest(&world, &SolverConfig::default()).expect("a load");
-        assert_eq!((load.upper, load.lower), (2, 1));
+        assert_eq!([load.upper, load.lower].map(BodyHandle::index), [2, 1]);
         assert!((load.force - 9810.0).abs() < 0.1);
         let lowest = |world: &World| {
             let loads = Load::all(world, &SolverConfig::default(), |_, _| true);
-            *loads.iter().find(|load| (load.upper, load.lower) == (1, 0)).expect("the floor bears")
+            *loads
+                .iter()
+                .find(|load| [load.upper, load.lower].map(BodyHandle::index) == [1, 0])
+                .expect("the floor bears")
         };
         world.bodies[2].gravity_scale = 3.0;
         assert!((lowest(&world).force - 4.0 * 9810.0).abs() < 0.1);
@@ -367,7 +373,7 @@ mod tests {
         sideways.gravity = glam::Vec3::new(0.0, 0.0, 1.0);
         sideways.beside(&world);
         let loads = Load::all(&sideways, &SolverConfig::default(), |_, _| true);
-        let in_second: Vec<_> = loads.iter().filter(|load| load.upper > 2).collect();
+        let in_second: Vec<_> = loads.iter().filter(|load| load.upper.index() > 2).collect();
         assert_eq!(in_second.len(), 2);
         assert!(in_second.iter().any(|of| of.force == load.force && of.stress == load.stress), "{loads:?}");
         world.gravity = glam::Vec3::ZERO;

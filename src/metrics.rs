@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::collide::Detector;
 use crate::config::SolverConfig;
 use crate::stats::largest;
-use crate::world::{Body, BodyKind, World};
+use crate::world::{Body, BodyHandle, BodyKind, World};
 
 /// Overlap of all touching pairs.
 ///
@@ -13,8 +13,8 @@ use crate::world::{Body, BodyKind, World};
 /// use drystone::{Body, Shape, SolverConfig, World, glam::Vec3, metrics::Penetration};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0));
 /// let Penetration { max, mean, .. } = Penetration::of_world(&world, &SolverConfig::default());
 /// assert!((max - 0.01).abs() < 1e-6 && max == mean);
 /// // Two manifolds with the separations of two points each (m).
@@ -70,26 +70,20 @@ fn fit(world: &World) -> Cow<'_, World> {
     fit
 }
 
-/// Speed of the fastest dynamic body (m/s) and its index; NaN counts as fastest.
+/// Speed of the fastest dynamic body (m/s), and that body; NaN counts as fastest. `None` without dynamic bodies.
 ///
 /// ```
 /// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
 /// # let mut world = World::new();
 /// # for speed in [3.0, 4.0] {
-/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// #     world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
 /// # }
-/// assert_eq!(metrics::fastest(&world), (4.0, 1));
+/// assert_eq!(metrics::fastest(&world), Some((4.0, 1.into())));
 /// ```
-pub fn fastest(world: &World) -> (f64, usize) {
-    // Start below any speed, so that a body is found even if all are at rest.
-    let mut best = (-1.0, 0);
-    for (i, b) in world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic) {
-        let speed = b.linear_velocity.as_dvec3().length();
-        if speed > best.0 || speed.is_nan() {
-            best = (speed, i);
-        }
-    }
-    if best.0 < 0.0 { (0.0, 0) } else { best }
+pub fn fastest(world: &World) -> Option<(f64, BodyHandle)> {
+    let of = |body: BodyHandle| (world.bodies[body].linear_velocity.as_dvec3().length(), body);
+    let dynamic = world.bodies.handles().filter(|&body| world.bodies[body].kind == BodyKind::Dynamic);
+    dynamic.map(of).reduce(|best, now| if now.0 > best.0 || now.0.is_nan() { now } else { best })
 }
 
 /// Root of the mean square speed, weighted by mass: sqrt(2 E / m) (m/s). 0 for a world without dynamic bodies.
@@ -98,7 +92,7 @@ pub fn fastest(world: &World) -> (f64, usize) {
 /// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
 /// # let mut world = World::new();
 /// # for speed in [3.0, 4.0] {
-/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// #     world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
 /// # }
 /// // Balls of one mass at 3 and 4 m/s.
 /// assert!((metrics::rms_speed(&world) - 12.5_f64.sqrt()).abs() < 1e-6);
@@ -144,7 +138,7 @@ pub fn in_place(before: &Body, after: &Body) -> bool {
 /// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
 /// # let mut world = World::new();
 /// # for speed in [3.0, 4.0] {
-/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// #     world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
 /// # }
 /// let mut after = world.clone();
 /// after.bodies[1].position += Vec3::new(3.0, -9.0, 4.0);
@@ -162,7 +156,7 @@ pub fn drift(before: &World, after: &World) -> f64 {
 /// # use drystone::{Body, Shape, World, glam::Vec3, metrics};
 /// # let mut world = World::new();
 /// # for speed in [3.0, 4.0] {
-/// #     world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
+/// #     world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).velocity(Vec3::X * speed, Vec3::ZERO));
 /// # }
 /// let mut after = world.clone();
 /// after.bodies[1].position.y += 1.0;
@@ -203,23 +197,23 @@ mod tests {
     #[test]
     fn penetration_is_the_deepest_the_mean_and_what_19_of_20_do_not_exceed() {
         let mut world = World::new();
-        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+        world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
         let cube =
             |k: usize, y: f32| Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(2.0 * k as f32, y, 0.0);
         for k in 1..=20 {
-            world.add(cube(k, 0.5 - 1e-3 * k as f32));
+            world.insert(cube(k, 0.5 - 1e-3 * k as f32));
         }
         let near = |x: f64, y: f64| (x - y).abs() < 1e-6;
         let config = SolverConfig::default();
         let of = Penetration::of_world(&world, &config);
         assert!(near(of.max, 0.020) && near(of.p95, 0.019) && near(of.mean, 0.0105), "{of:?}");
         // A manifold within its margin counts as touching, with a depth of zero.
-        world.add(cube(21, 0.505));
+        world.insert(cube(21, 0.505));
         let of = Penetration::of_world(&world, &config);
         assert!(near(of.max, 0.020) && near(of.p95, 0.019) && near(of.mean, 0.010), "{of:?}");
         // Bodies that cannot be simulated touch nothing.
-        world.add(Body::dynamic().shape(Shape::cuboid(1.0, -1.0, 1.0)));
-        world.add(cube(22, f32::NAN));
+        world.insert(Body::dynamic().shape(Shape::cuboid(1.0, -1.0, 1.0)));
+        world.insert(cube(22, f32::NAN));
         assert_eq!(Penetration::of_world(&world, &config), of);
         assert_eq!(Penetration::of_world(&World::new(), &config), Penetration::default());
     }
@@ -227,10 +221,10 @@ mod tests {
     /// 1 kg at 3 m/s, 3 kg at 1 m/s, and a fixed body that does not count.
     fn two_that_move() -> World {
         let mut world = World::new();
-        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+        world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
         for (mass, speed) in [(1.0, 3.0), (3.0, 1.0)] {
             let ball = Body::dynamic().shape(Shape::ball(0.5)).total_mass(mass);
-            world.add(ball.velocity(Vec3::new(0.0, 0.6, -0.8) * speed, Vec3::ZERO));
+            world.insert(ball.velocity(Vec3::new(0.0, 0.6, -0.8) * speed, Vec3::ZERO));
         }
         world
     }
@@ -244,15 +238,15 @@ mod tests {
     #[test]
     fn the_fastest_is_named_and_what_is_no_number_is_faster_than_all() {
         let mut world = two_that_move();
-        let (speed, body) = fastest(&world);
-        assert!((speed - 3.0).abs() < 1e-6 && body == 1, "{speed} m/s of {body}");
+        let (speed, body) = fastest(&world).expect("a dynamic body");
+        assert!((speed - 3.0).abs() < 1e-6 && body == 1.into(), "{speed} m/s of {body:?}");
         world.bodies[2].linear_velocity.x = f32::NAN;
-        let (speed, body) = fastest(&world);
-        assert!(speed.is_nan() && body == 2, "{speed} m/s of {body}");
+        let (speed, body) = fastest(&world).expect("a dynamic body");
+        assert!(speed.is_nan() && body == 2.into(), "{speed} m/s of {body:?}");
         world.bodies[0].linear_velocity = Vec3::splat(100.0);
         world.bodies[2].linear_velocity = Vec3::ZERO;
-        assert_eq!(fastest(&world).1, 1, "a fixed body is not fast");
-        assert_eq!(fastest(&World::new()), (0.0, 0));
+        assert_eq!(fastest(&world).map(|(_, body)| body), Some(1.into()), "a fixed body is not fast");
+        assert_eq!(fastest(&World::new()), None);
     }
 
     #[test]

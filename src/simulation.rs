@@ -54,8 +54,8 @@ struct Unfinished {
 /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
-/// let brick = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
+/// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+/// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// for _ in 0..60 {
 ///     simulation.step(1.0 / 60.0)?;
@@ -68,10 +68,10 @@ struct Unfinished {
 /// use drystone::{Body, Joint, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// let brick = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
-/// let lamp = world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0).position(3.0, 2.0, 0.0));
-/// world.join(Joint::to_world(lamp, Vec3::Y, Vec3::new(3.0, 3.0, 0.0)).hinge(Vec3::Z));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
+/// let lamp = world.insert(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0).position(3.0, 2.0, 0.0));
+/// world.insert_joint(Joint::to_world(lamp, Vec3::Y, Vec3::new(3.0, 3.0, 0.0)).hinge(Vec3::Z));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// assert!(simulation.listening().impulses);
@@ -195,7 +195,7 @@ impl Simulation {
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
     ///
     /// let mut world = World::new();
-    /// let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)));
     /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// pollster::block_on(simulation.step_async(0.01))?;
     /// assert!(simulation.world.bodies[ball].linear_velocity.y < -0.09);
@@ -397,8 +397,8 @@ impl Simulation {
         (stats.sweeps, stats.planned_sweeps) = (convergence.sweeps, convergence.planned);
         stats.asleep = self.stages.sleep.count();
         self.stages.is_foreign &= stats.asleep > 0;
-        let is_finite = |&&i: &&usize| self.world.bodies[i].is_finite();
-        stats.first_non_finite = self.stages.astray.iter().find(|i| !is_finite(i)).copied();
+        let first = self.stages.astray.iter().find(|&&i| !self.world.bodies[i].is_finite());
+        stats.first_non_finite = first.and_then(|&i| self.world.bodies.handle(i));
     }
 
     /// Refuses rows that follow from forged state.
@@ -459,7 +459,7 @@ impl Simulation {
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
     ///
     /// let mut world = World::new();
-    /// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    /// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
     /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.step(1.0 / 60.0)?;
@@ -515,10 +515,9 @@ impl Simulation {
         Penetration::of_world(&self.world, &self.config)
     }
 
-    /// The manifolds of the last step, with their impulses.
+    /// The manifolds of the last step, with their impulses. It leaves out those of bodies that were removed since.
     pub fn manifolds(&self) -> impl Iterator<Item = SolvedManifold> + Clone {
-        let Stages { detector, contacts, problem, .. } = &self.stages;
-        manifolds::of(detector, contacts, problem, self.stages.least_substeps())
+        manifolds::of(&self.stages, &self.world)
     }
 
     /// The contacts that the last step found, also near ones, in an order that can change from step to step. The call
@@ -535,7 +534,7 @@ impl Simulation {
     /// use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, World};
     ///
     /// let mut world = World::new();
-    /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
     /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
     /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
@@ -572,9 +571,9 @@ impl Simulation {
     /// use drystone::{Body, Joint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
     ///
     /// let mut world = World::new();
-    /// let wall = world.add(Body::fixed());
+    /// let wall = world.insert(Body::fixed());
     /// let beam = Body::dynamic().shape(Shape::cuboid(0.5, 0.05, 0.05)).total_mass(2.0);
-    /// let beam = world.add(beam.position(0.5, 0.0, 0.0));
+    /// let beam = world.insert(beam.position(0.5, 0.0, 0.0));
     /// let weld = world.insert_joint(Joint::new(wall, Vec3::ZERO, beam, Vec3::X * -0.5).fixed());
     /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// assert_eq!(simulation.joint_force(weld), None);

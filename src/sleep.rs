@@ -48,7 +48,7 @@ impl Snapshot {
             angular_velocity: body.angular_velocity,
             force: body.whole_force(),
             torque: body.whole_torque(),
-            gravity: world.gravity_on(i),
+            gravity: world.gravity_at(i),
         }
     }
 

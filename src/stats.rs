@@ -6,6 +6,8 @@ use std::time::Instant;
 #[cfg(all(target_family = "wasm", target_os = "unknown", feature = "gpu"))]
 use web_time::Instant;
 
+use crate::world::BodyHandle;
+
 /// Times and counts of one step.
 ///
 /// ```
@@ -69,7 +71,7 @@ pub struct StepStats {
     pub kernels: Vec<KernelTime>,
     /// The first body whose pose or velocity became not finite in the step, or `None`. The body touches nothing from
     /// then on, and later steps do not fail because of it.
-    pub first_non_finite: Option<usize>,
+    pub first_non_finite: Option<BodyHandle>,
     /// One line if a device was lost in this step: the reason, and the backend that repeated the step and continues.
     pub fault: Option<String>,
 }

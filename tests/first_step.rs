@@ -11,9 +11,9 @@ fn threads() -> usize {
 #[test]
 fn the_first_step_of_a_process_begins_no_thread() {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for i in 0..10 {
-        world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
+        world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
     }
     let mut simulation = Simulation::new(world).expect("a world that can be simulated");
     let begun = threads();

@@ -29,7 +29,7 @@ pub enum DebugLine {
 /// use bevy_drystone::drystone::{Body, Shape, Simulation, World};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::cuboid(0.5, 0.5, 0.5)));
+/// world.insert(Body::fixed().shape(Shape::cuboid(0.5, 0.5, 0.5)));
 /// let physics = Physics::new(Simulation::new(world)?);
 /// let lines = debug_lines(&physics);
 /// // The edges of 12 triangles.

@@ -70,10 +70,10 @@ impl Joint {
         // Two bodies whose only joint this is.
         let mut alone = Bodies::new();
         for _ in 0..2 {
-            alone.add(Body::fixed());
+            alone.insert(Body::fixed());
         }
         let other = |b| usize::from(b != self.body_a).into();
-        alone.join(drystone::Joint { body_a: 0.into(), body_b: self.body_b.map(other), ..self.settings });
+        alone.insert_joint(drystone::Joint { body_a: 0.into(), body_b: self.body_b.map(other), ..self.settings });
         alone.check_joints().map_err(|error| error.to_string().replacen("joint 0: ", "", 1))?;
         Ok(drystone::Joint { body_a, body_b, ..self.settings })
     }

@@ -18,7 +18,7 @@ pub(crate) fn step(mut physics: ResMut<Physics>, time: Res<Time<Fixed>>, mut err
     let error = match simulation.step(time.timestep().as_secs_f32()) {
         Ok(done) => {
             *stats = done;
-            stats.first_non_finite.and_then(|index| simulation.world.bodies.handle(index)).map(|body| {
+            stats.first_non_finite.map(|body| {
                 let text = "its pose or velocity left the finite range".to_owned();
                 PhysicsError { entity: tables.entity(body), text }
             })

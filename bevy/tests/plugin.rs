@@ -137,14 +137,14 @@ fn the_bits_are_those_of_the_library() {
     spawn_scene(&mut app);
     step(&mut app, 100);
     let mut world = Bodies::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for i in 0..12 {
         let body = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
         let body = body.position(0.3 * (i % 3) as f32, 0.6 + 1.05 * i as f32, 0.1 * (i % 2) as f32);
-        world.add(if i % 4 == 0 { body.total_mass(3.0).linear_damping(0.1) } else { body });
+        world.insert(if i % 4 == 0 { body.total_mass(3.0).linear_damping(0.1) } else { body });
     }
     let door = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(5.0, 3.0, 0.0));
-    world.join(Link::to_world(door, Vec3::X, Vec3::new(6.0, 3.0, 0.0)).hinge(Vec3::Z).motor(3.0, 1e4));
+    world.insert_joint(Link::to_world(door, Vec3::X, Vec3::new(6.0, 3.0, 0.0)).hinge(Vec3::Z).motor(3.0, 1e4));
     let mut simulation = Simulation::new(world).expect("a world");
     for _ in 0..100 {
         simulation.step(1.0 / 64.0).expect("a step");

@@ -31,22 +31,22 @@ pub const BALL: usize = 3;
 /// start. Rows lie along z and columns along x. The floor is at y = 0.
 pub fn scene(map: &Map) -> Result<Scene> {
     let mut world = World::new();
-    world.add(Body::kinematic().named("board").shape(surface(map)?));
+    world.insert(Body::kinematic().named("board").shape(surface(map)?));
     // The goal is a separate body, so that it has another color. Boundary edges have the normal of their surface, so
     // the ball rolls across them.
     let mut plate = Surface::default();
     plate.quad(corners(map, map.goal.0 as isize, map.goal.1 as isize), Vec3::Y);
-    world.add(Body::kinematic().named("goal").shape(Shape::mesh(plate.vertices, plate.triangles)?));
+    world.insert(Body::kinematic().named("goal").shape(Shape::mesh(plate.vertices, plate.triangles)?));
     let mut lids = Body::kinematic().named("walls");
     for (place, half_length) in wall_runs(map) {
         // The lid is beyond the contact distance of the ball.
         let lid = Shape::cuboid(half_length, 0.0005, 0.5 * CELL);
         lids = lids.shape_at(lid, place + (HEIGHT + 0.0005) * Vec3::Y, Quat::IDENTITY);
     }
-    world.add(lids);
+    world.insert(lids);
     let Vec3 { x, z, .. } = center_of(map, map.start);
     let ball = Body::dynamic().named("ball").density(7800.0).shape(Shape::ball(RADIUS)).position(x, RADIUS, z);
-    world.add(ball);
+    world.insert(ball);
     Ok(Scene { dt: 1.0 / RATE, ..Scene::new(format!("maze {}", map.name), world, 10 * RATE as u32) })
 }
 

@@ -85,8 +85,8 @@ fn the_gpu_plays_the_same_game_to_the_last_bit() {
 fn roll_over(floor: Body) -> (f32, f32) {
     let mut world = World::new();
     let tilt = Quat::from_rotation_x(1.0_f32.to_radians()) * Quat::from_rotation_z(-2.0_f32.to_radians());
-    world.add(floor.rotation(tilt));
-    let ball = world.add(Body::dynamic().density(7800.0).shape(Shape::ball(RADIUS)));
+    world.insert(floor.rotation(tilt));
+    let ball = world.insert(Body::dynamic().density(7800.0).shape(Shape::ball(RADIUS)));
     world.bodies[ball].position = tilt * Vec3::new(-0.97, RADIUS, -0.97);
     let mut simulation =
         Simulation::with(world, SolverConfig::default().without_sleep(), reference()).expect("a simulation");

@@ -141,7 +141,7 @@ impl Measure {
             Self::AngularMomentumX => turning(0),
             Self::AngularMomentumY => turning(1),
             Self::AngularMomentumZ => turning(2),
-            Self::Fastest => metrics::fastest(world).0,
+            Self::Fastest => metrics::fastest(world).map_or(0.0, |(speed, _)| speed),
             Self::Need => member.stats().hardest.map_or(0.0, |hardest| f64::from(hardest.need)),
             Self::EnergyTaken => member.stats().energy_taken,
             Self::Contacts => member.simulation().contacts().count() as f64,

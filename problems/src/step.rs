@@ -13,8 +13,8 @@ use crate::residuals::Residuals;
 /// ```
 /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+/// # world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let (problem, _) = drystone_problems::step_with_contacts(&mut simulation, "a ball", 1.0 / 60.0)?;
 /// assert_eq!((problem.name.as_str(), problem.contacts.len()), ("a ball", 1));
@@ -35,8 +35,8 @@ pub fn step_with_contacts(simulation: &mut Simulation, name: &str, dt: f32) -> R
 /// ```
 /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+/// # world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// assert!(drystone_problems::step_with_residuals(&mut simulation, 1.0 / 60.0)?.e_vel < 1e-3);
 /// # Ok::<(), drystone::Error>(())

@@ -6,11 +6,11 @@ use super::catalogue::{CATALOGUE, MAX_BODIES};
 #[cfg(feature = "serde")]
 use super::file::load;
 use super::scene::{Group, Scene};
-use super::spawner::Spawner;
-use drystone::Result;
+use super::spawner::{Leaves, Spawner};
 use drystone::stages::error::{ensure, input};
 use drystone::stages::memory;
 use drystone::stages::suggest::hint;
+use drystone::{BodyHandle, Result};
 
 impl Scene {
     /// Finds a scene by its catalogue name, else reads the file of that name, which needs the feature `serde`.
@@ -116,8 +116,10 @@ impl Scene {
         let (first, worlds) = (self.world.bodies.len(), self.world.world_count());
         let spawner = |s: &Spawner| Spawner { world: worlds + s.world, ..s.clone() };
         self.spawners.extend(other.spawners.iter().map(spawner));
-        self.leaving.extend(other.leaving.iter().map(|&(body, leaves)| (first + body, leaves)));
         self.world.beside(&other.world);
+        let leaving =
+            |&(body, leaves): &(BodyHandle, Leaves)| Some((self.world.bodies.handle(first + body.index())?, leaves));
+        self.leaving.extend(other.leaving.iter().filter_map(leaving));
         let moved = |g: &Group| Group { name: g.name.clone(), bodies: first + g.bodies.start..first + g.bodies.end };
         self.groups.extend(other.groups.iter().map(moved));
         self.container = self.container.filter(|c| other.container == Some(*c));

@@ -41,7 +41,7 @@ impl Default for RecordingIntervals {
 /// use drystone_scenes::{Recorder, RecordingIntervals, Replay};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+/// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let mut recorder = Recorder::new(Vec::new(), "a ball", &mut simulation, RecordingIntervals::default())?;
@@ -114,7 +114,7 @@ impl<W: Write> Recorder<W> {
     /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
     /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
     /// # let mut world = World::new();
-    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
     /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// # pollster::block_on(async {
     /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
@@ -192,7 +192,7 @@ impl Recorder<Vec<u8>> {
     /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
     /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
     /// # let mut world = World::new();
-    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
     /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
     /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
@@ -237,7 +237,7 @@ fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
 /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
 /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
 /// # let mut world = World::new();
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # let intervals = RecordingIntervals { hash: 1, state: 4 };
 /// # let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, intervals)?;
@@ -286,7 +286,7 @@ struct KeptState {
 /// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
 /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
 /// # let mut world = World::new();
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # let intervals = RecordingIntervals { hash: 1, state: 4 };
 /// # let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, intervals)?;
@@ -489,7 +489,7 @@ impl Replay {
     /// use drystone_scenes::{Recorder, RecordingIntervals, Replay};
     ///
     /// let mut world = World::new();
-    /// world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// world.insert(Body::dynamic().shape(Shape::ball(0.5)));
     /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let mut recorder = Recorder::new(Vec::new(), "a ball", &mut simulation, RecordingIntervals::default())?;
     /// recorder.step(&mut simulation, 0.01)?;

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::driver::Driver;
 use super::spawner::{Leaves, Spawner};
 use drystone::stages::error::ensure;
-use drystone::{Result, World};
+use drystone::{BodyHandle, Result, World};
 
 /// A world, with the data that a run needs.
 ///
@@ -16,8 +16,8 @@ use drystone::{Result, World};
 /// use drystone_scenes::Scene;
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
 /// let mut scene = Scene::new("a ball", world, 60).standing();
 /// scene.container = Some((Vec3::splat(-1.0), Vec3::splat(1.0)));
 /// assert!(scene.stands && scene.escaped(&scene.world) == 0);
@@ -43,8 +43,8 @@ pub struct Scene {
     pub groups: Vec<Group>,
     /// Spawners, which add bodies while the scene runs; [`Spawners`](super::Spawners) runs them.
     pub spawners: Vec<Spawner>,
-    /// Bodies of the world that leave while the scene runs, by index.
-    pub leaving: Vec<(usize, Leaves)>,
+    /// Bodies of the world that leave while the scene runs.
+    pub leaving: Vec<(BodyHandle, Leaves)>,
     /// Drives a body of the scene by input, or `None`. A scene file does not keep it.
     pub driver: Option<Driver>,
 }

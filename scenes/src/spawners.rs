@@ -66,14 +66,12 @@ impl Staying {
 impl Spawners {
     /// The spawners of a scene before its first step.
     pub fn new(scene: &Scene) -> Self {
-        let staying = |&(body, leaves): &(usize, Leaves)| {
-            Some(Staying { body: scene.world.bodies.handle(body)?, leaves, came: 0 })
-        };
+        let staying = |&(body, leaves): &(BodyHandle, Leaves)| Staying { body, leaves, came: 0 };
         Self {
             spawners: scene.spawners.clone(),
             brought: vec![0; scene.spawners.len()],
             due: scene.spawners.iter().map(|spawner| spawner.first).collect(),
-            staying: scene.leaving.iter().filter_map(staying).collect(),
+            staying: scene.leaving.iter().map(staying).collect(),
             ..Self::default()
         }
     }
@@ -127,7 +125,7 @@ impl Spawners {
     /// let (left, _) = spawners.remaining(scene.dt);
     /// assert_eq!((left[0].first, left[0].count), (5, Some(1)));
     /// ```
-    pub fn remaining(&self, dt: f32) -> (Vec<Spawner>, Vec<(usize, Leaves)>) {
+    pub fn remaining(&self, dt: f32) -> (Vec<Spawner>, Vec<(BodyHandle, Leaves)>) {
         let spawner = |((spawner, &brought), due): ((&Spawner, &u32), &u32)| {
             let (first, count) = (due.saturating_sub(self.steps), spawner.count.map(|count| count - brought));
             (!is_done(spawner, brought)).then(|| Spawner { first, count, ..spawner.clone() })
@@ -135,7 +133,7 @@ impl Spawners {
         let leaving = |staying: &Staying| {
             let after =
                 staying.leaves.after.map(|after| (f64::from(after) - staying.age(self.steps, dt)).max(0.0) as f32);
-            (staying.body.index(), Leaves { after, ..staying.leaves })
+            (staying.body, Leaves { after, ..staying.leaves })
         };
         let spawners = self.spawners.iter().zip(&self.brought).zip(&self.due).filter_map(spawner).collect();
         (spawners, self.staying.iter().map(leaving).collect())

@@ -176,7 +176,7 @@ impl Member {
     /// The step left a number that is not finite.
     pub(super) fn note_step(&mut self, dt: Option<f32>) -> Result<()> {
         if let Some(body) = self.stats.first_non_finite {
-            return Err(input!("{}: is no longer finite after a step", self.simulation.world.name_of(body)));
+            return Err(input!("{}: is no longer finite after a step", self.simulation.world.name_of(body.index())));
         }
         self.steps += 1;
         self.time += f64::from(dt.unwrap_or(self.dt));

@@ -39,8 +39,8 @@ use surroundings::{Footing, Glide, Surroundings, Touch};
 /// use drystone::{Body, Character, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// world.add(Body::fixed().shape(Shape::cuboid(0.5, 0.15, 2.0)).position(2.0, 0.15, 0.0).named("a step"));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.insert(Body::fixed().shape(Shape::cuboid(0.5, 0.15, 2.0)).position(2.0, 0.15, 0.0).named("a step"));
 /// let capsule = Body::kinematic().shape(Shape::capsule(0.6, 0.3)).position(0.0, 0.906, 0.0);
 /// let mut character = Character::new(world.insert(capsule));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;

@@ -339,7 +339,7 @@ impl Detector {
         filter: Option<&mut PairFilter>,
     ) -> DetectStats {
         let state = |i: usize| activity.get(i).copied().unwrap_or(Activity::Awake);
-        let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i), world.gravity_on(i));
+        let moving = |(i, body): (usize, &Body)| BodyState::of(body, state(i), world.gravity_at(i));
         world.bodies.par_iter().enumerate().with_min_len(256).map(moving).collect_into_vec(&mut self.moving);
         for (a, b) in world.enabled_joints().map(Joint::indices) {
             [Some(a), b].into_iter().flatten().for_each(|body| self.moving[body].tied = 1.0);

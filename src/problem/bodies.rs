@@ -51,7 +51,7 @@ fn write_bodies(world: &World, asleep: &[bool], config: &SolverConfig, problem: 
         if b.whole_torque() != Vec3::ZERO {
             has_torques.store(true, Ordering::Relaxed);
         }
-        let acceleration = b.unlocked(world.gravity_on(index) + b.whole_force() / b.mass.mass).to_array();
+        let acceleration = b.unlocked(world.gravity_at(index) + b.whole_force() / b.mass.mass).to_array();
         MassRow { acceleration, ..mass_row(b) }
     };
     world.bodies.par_iter().with_min_len(MIN_BODIES).enumerate().map(mass).collect_into_vec(&mut problem.masses);

@@ -150,7 +150,7 @@ impl JointRows {
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
             let ends = self.joints.iter().map(Joint::indices);
-            ends.flat_map(|(a, b)| [Some(a), b]).flatten().map(|body| world.gravity_on(body))
+            ends.flat_map(|(a, b)| [Some(a), b]).flatten().map(|body| world.gravity_at(body))
         };
         if is_chosen && self.gravity.iter().copied().eq(felt()) {
             return;

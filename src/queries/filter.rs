@@ -12,7 +12,7 @@ pub type Predicate<'a> = &'a dyn Fn(BodyHandle, &Body) -> bool;
 /// use drystone::{Body, BodyKind, Shape, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::ball(2.0)));
+/// world.insert(Body::fixed().shape(Shape::ball(2.0)));
 /// let small = world.insert(Body::dynamic().shape(Shape::ball(1.0)));
 /// let is_dynamic = |_, body: &Body| body.kind == BodyKind::Dynamic;
 /// let found = Queries::of(&world).point(Vec3::ZERO, &Filter::default().only(&is_dynamic));

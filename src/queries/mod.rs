@@ -20,7 +20,7 @@ pub use filter::{Filter, Predicate};
 /// use drystone::{Body, Shape, World, glam::Vec3, queries::{Filter, Hit, Queries}};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// let hit: Hit = Queries::of(&world).ray(Vec3::Y * 2.0, Vec3::NEG_Y, 10.0, &Filter::default()).expect("the ground");
 /// assert_eq!((hit.distance, hit.point, hit.normal, hit.collider), (2.0, Vec3::ZERO, Vec3::Y, 0));
 /// ```
@@ -56,7 +56,7 @@ pub type Found = (BodyHandle, usize);
 /// use drystone::{Body, Shape, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
 /// let queries = Queries::of(&world);
 ///

@@ -14,7 +14,7 @@ use crate::world::World;
 /// use drystone::{Body, Contact, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
@@ -44,8 +44,8 @@ pub struct Contact {
 /// ```
 /// # use drystone::{Body, ContactPoint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).position(2.0, 0.5, 0.0));
+/// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(2.0, 0.5, 0.0));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.step(1.0 / 60.0)?;
 /// let contact = simulation.contacts().next().expect("a ball on the floor");

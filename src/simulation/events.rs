@@ -76,7 +76,7 @@ crate::saved::fields!(ColliderOf { body, collider });
 /// ```
 /// # use drystone::{Body, Event, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { contacts: true, ..Listen::default() })?;
@@ -151,7 +151,7 @@ pub enum Event {
 /// ```
 /// # use drystone::{Body, Event, Hit, Listen, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { hits_above: Some(1.0), ..Listen::default() })?;

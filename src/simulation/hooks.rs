@@ -23,7 +23,7 @@ use crate::world::{Body, Material, World};
 /// it was.
 ///
 /// ```
-/// use drystone::{Body, ColliderOf, ContactHooks, PendingContact, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, BodyHandle, ColliderOf, ContactHooks, PendingContact, Reference, Shape, Simulation, SolverConfig, World};
 /// use drystone::glam::Vec3;
 ///
 /// /// Bodies with a common name pass through each other, and the floor is icy where x is above 0.
@@ -43,15 +43,15 @@ use crate::world::{Body, Material, World};
 /// }
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// let slider = || Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).velocity(Vec3::X, Vec3::ZERO);
-/// let [rough, icy] = [-10.0, 10.0].map(|x| world.add(slider().position(x, 0.5, 0.0)));
-/// let ghost = world.add(slider().named("ghost").position(20.0, 0.5, 0.0));
-/// world.add(slider().named("ghost").position(20.5, 0.5, 0.0));
+/// let [rough, icy] = [-10.0, 10.0].map(|x| world.insert(slider().position(x, 0.5, 0.0)));
+/// let ghost = world.insert(slider().named("ghost").position(20.0, 0.5, 0.0));
+/// world.insert(slider().named("ghost").position(20.5, 0.5, 0.0));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.set_hooks(Some(Box::new(Rules)));
 /// (0..30).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
-/// let speed = |body: usize| simulation.world.bodies[body].linear_velocity.x;
+/// let speed = |body: BodyHandle| simulation.world.bodies[body].linear_velocity.x;
 /// assert!(speed(rough).abs() < 1e-3 && (speed(icy) - 1.0).abs() < 1e-3 && (speed(ghost) - 1.0).abs() < 1e-3);
 /// # Ok::<(), drystone::Error>(())
 /// ```
@@ -77,15 +77,15 @@ pub trait ContactHooks: Send + Sync {
 /// A contact that a step has found but not yet solved, over one pair of convex parts: see [`ContactHooks::modify`].
 ///
 /// ```
-/// use drystone::{Body, ContactHooks, PendingContact, PendingPoint, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, BodyHandle, ContactHooks, PendingContact, PendingPoint, Reference, Shape, Simulation, SolverConfig, World};
 /// use drystone::glam::Vec3;
 ///
 /// /// A platform holds what comes down on it.
-/// struct OneWay(usize);
+/// struct OneWay(BodyHandle);
 ///
 /// impl ContactHooks for OneWay {
 ///     fn modify(&mut self, world: &World, contact: &mut PendingContact) {
-///         let [a, b] = [contact.a, contact.b].map(|side| side.body.index());
+///         let [a, b] = [contact.a.body, contact.b.body];
 ///         let other = if a == self.0 { b } else { a };
 ///         if [a, b].contains(&self.0) && world.bodies[other].linear_velocity.y > 0.0 {
 ///             contact.points_mut().iter_mut().for_each(|point: &mut PendingPoint| point.is_dropped = true);
@@ -94,9 +94,9 @@ pub trait ContactHooks: Send + Sync {
 /// }
 ///
 /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-/// let platform = world.add(Body::fixed().shape(Shape::cuboid(2.0, 0.1, 2.0)));
+/// let platform = world.insert(Body::fixed().shape(Shape::cuboid(2.0, 0.1, 2.0)));
 /// let ball = |y: f32| Body::dynamic().shape(Shape::ball(0.2)).position(0.0, y, y);
-/// let [rises, falls] = [(-1.0, 2.0), (1.0, -2.0)].map(|(y, v)| world.add(ball(y).velocity(Vec3::Y * v, Vec3::ZERO)));
+/// let [rises, falls] = [(-1.0, 2.0), (1.0, -2.0)].map(|(y, v)| world.insert(ball(y).velocity(Vec3::Y * v, Vec3::ZERO)));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.set_hooks(Some(Box::new(OneWay(platform))));
 /// (0..60).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;

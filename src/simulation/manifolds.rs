@@ -2,21 +2,24 @@
 
 use glam::Vec3;
 
-use crate::collide::{Detector, MAX_POINTS, Manifold, NO_SLOT, Pair};
-use crate::problem::{ContactRows, ImpulseRow, StepProblem};
+use super::events::ColliderOf;
+use super::stages::{Stages, collider_of};
+use crate::collide::{MAX_POINTS, Manifold, NO_SLOT, Pair};
+use crate::problem::ImpulseRow;
+use crate::world::World;
 
 /// The contact of two bodies over one pair of convex parts, after the last step.
 ///
 /// ```
 /// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, SolvedManifold, World, glam::Vec3};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// # let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
+/// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let manifold: SolvedManifold = simulation.manifolds().next().expect("a ball on the floor");
-/// assert_eq!((manifold.body_b, manifold.normal, manifold.points().len()), (ball, Vec3::Y, 1));
+/// assert_eq!((manifold.b.body, manifold.normal, manifold.points().len()), (ball, Vec3::Y, 1));
 /// // 6 kg for a substep of 1/480 s.
 /// assert_eq!(manifold.substeps, 8);
 /// assert!((manifold.normal_impulse() - 6.0 * 9.81 / 480.0).abs() < 1e-3);
@@ -24,10 +27,10 @@ use crate::problem::{ContactRows, ImpulseRow, StepProblem};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolvedManifold {
-    /// The body that the normal points away from.
-    pub body_a: usize,
-    /// The body that the normal points to.
-    pub body_b: usize,
+    /// The collider that the normal points away from.
+    pub a: ColliderOf,
+    /// The collider that the normal points to.
+    pub b: ColliderOf,
     /// Unit normal from a to b, world axes.
     pub normal: Vec3,
     /// The color of the contact among those of its kind, or `None` if it has no color and is solved alone.
@@ -54,8 +57,8 @@ pub struct SolvedManifold {
 /// ```
 /// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, SolvedPoint, World, glam::Vec3};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
+/// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
@@ -89,8 +92,8 @@ pub struct SolvedPoint {
 /// ```
 /// # use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, Summed, World, glam::Vec3};
 /// # let mut world = World::new();
-/// # world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
+/// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
@@ -119,22 +122,18 @@ impl SolvedManifold {
     }
 }
 
-/// All manifolds that have rows, in the order of their pairs.
-pub(super) fn of(
-    detector: &Detector,
-    contacts: &ContactRows,
-    problem: &StepProblem,
-    substeps: u32,
-) -> impl Iterator<Item = SolvedManifold> + Clone {
-    let all = detector.pairs().flat_map(|pair| pair.manifolds.iter().map(move |manifold| (pair, manifold)));
+/// All manifolds that have rows, in the order of their pairs, without those of bodies that were removed since the step.
+pub(super) fn of(stages: &Stages, world: &World) -> impl Iterator<Item = SolvedManifold> + Clone {
+    let detector = &stages.detector;
+    let is_there = |pair: &&Pair| [pair.body_a, pair.body_b].iter().all(|&body| detector.knows(world, body as usize));
+    let pairs = detector.pairs().filter(is_there);
+    let all = pairs.flat_map(|pair| pair.manifolds.iter().map(move |manifold| (pair, manifold)));
     let written = all.filter(|(_, manifold)| manifold.slot != NO_SLOT && !manifold.has_ended());
-    written.map(move |(pair, manifold)| {
-        let solved = solved(pair, manifold, contacts, problem);
-        SolvedManifold { substeps: substeps * solved.substeps, ..solved }
-    })
+    written.map(move |(pair, manifold)| solved(stages, world, pair, manifold))
 }
 
-fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &StepProblem) -> SolvedManifold {
+fn solved(stages: &Stages, world: &World, pair: &Pair, manifold: &Manifold) -> SolvedManifold {
+    let Stages { contacts, problem, .. } = stages;
     let contact = &problem.contacts[manifold.slot as usize];
     let (tangent_1, tangent_2) = contact.tangents();
     let friction = |impulse: &ImpulseRow| tangent_1 * impulse.tangent_1 + tangent_2 * impulse.tangent_2;
@@ -162,10 +161,12 @@ fn solved(pair: &Pair, manifold: &Manifold, contacts: &ContactRows, problem: &St
         summed = Some(problem.total_impulse(contact));
     }
     let patch = if problem.has_patches() { problem.impulses[first + count] } else { ImpulseRow::default() };
+    let [a, b] =
+        [(pair.body_a, pair.colliders[0]), (pair.body_b, pair.colliders[1])].map(|side| collider_of(world, side));
     SolvedManifold {
-        substeps: (1.0 / contact.substep_share) as u32,
-        body_a: pair.body_a as usize,
-        body_b: pair.body_b as usize,
+        substeps: stages.least_substeps() * (1.0 / contact.substep_share) as u32,
+        a,
+        b,
         normal: manifold.normal,
         color: contacts.color_of(manifold.slot),
         preload: contact.preload,

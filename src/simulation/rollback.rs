@@ -14,8 +14,8 @@ use crate::error::{Result, input};
 /// use drystone::{Body, Reference, Rollback, Shape, Simulation, SolverConfig, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-/// let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
+/// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+/// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let mut rollback = Rollback::new(8);
 /// for _ in 0..20 {

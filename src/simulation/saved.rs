@@ -13,7 +13,7 @@ use crate::world::World;
 /// ```
 /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
 /// # let mut world = World::new();
-/// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+/// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
 /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// let mut state: drystone::Snapshot = simulation.snapshot();
 /// simulation.step(1.0 / 60.0)?;
@@ -59,8 +59,8 @@ impl Simulation {
     /// use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
     ///
     /// let mut world = World::new();
-    /// world.add(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
-    /// world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
+    /// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
+    /// world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
     /// let mut one = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// one.step(1.0 / 60.0)?;
     /// let mut other = one.fork(Box::new(Cpu::new()));
@@ -84,7 +84,7 @@ impl Simulation {
     /// ```
     /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
     /// # let mut world = World::new();
-    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
     /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let before = simulation.snapshot();
     /// simulation.step(1.0 / 60.0)?;
@@ -146,7 +146,7 @@ impl Simulation {
     /// ```
     /// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
     /// # let mut world = World::new();
-    /// # world.add(Body::dynamic().shape(Shape::ball(0.5)));
+    /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
     /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// let bytes = simulation.save();
     /// let mut again = Simulation::load(&bytes, Box::new(Cpu::new()))?;

@@ -19,8 +19,8 @@ use crate::saved::{Archive, Columns, Saved};
 /// no identity: it accepts any handle, and any world accepts its handles. Handles compare by index and generation
 /// alone, so handles of two worlds can be equal.
 ///
-/// An index converts to the handle of the *first* body at that index. [`World::add`](super::World::add) returns the
-/// index of that body as long as no body was removed before.
+/// An index converts to the handle of the *first* body at that index: that of the body itself as long as no body was
+/// removed there.
 ///
 /// ```
 /// use drystone::{Body, BodyHandle, World};
@@ -99,7 +99,7 @@ impl BodyHandle {
 /// ```compile_fail
 /// # use drystone::{Body, World};
 /// # let mut world = World::new();
-/// # [(); 2].map(|()| world.add(Body::fixed()));
+/// # [(); 2].map(|()| world.insert(Body::fixed()));
 /// world.bodies.swap(0, 1);
 /// ```
 #[derive(Debug, Default)]
@@ -375,6 +375,29 @@ impl IndexMut<usize> for Bodies {
     fn index_mut(&mut self, index: usize) -> &mut Body {
         &mut self.all[index]
     }
+}
+
+/// # Panics
+/// The body is gone. [`World::body`](super::World::body) returns `None` instead.
+impl Index<BodyHandle> for Bodies {
+    type Output = Body;
+    fn index(&self, handle: BodyHandle) -> &Body {
+        &self.all[self.index_of(handle).unwrap_or_else(|| gone(handle))]
+    }
+}
+
+/// # Panics
+/// The body is gone. [`World::body_mut`](super::World::body_mut) returns `None` instead.
+impl IndexMut<BodyHandle> for Bodies {
+    fn index_mut(&mut self, handle: BodyHandle) -> &mut Body {
+        let index = self.index_of(handle).unwrap_or_else(|| gone(handle));
+        &mut self.all[index]
+    }
+}
+
+#[cold]
+fn gone(handle: BodyHandle) -> ! {
+    panic!("{handle:?} names no body of this world")
 }
 
 impl<'a> IntoIterator for &'a Bodies {

@@ -26,10 +26,10 @@ use crate::saved::{Archive, Saved};
 /// use glam::Vec3;
 ///
 /// let mut world = World::new();
-/// let wall = world.add(Body::fixed().shape(Shape::cuboid(0.1, 2.0, 2.0)));
-/// let door = world.add(Body::dynamic().position(0.6, 0.0, 0.0).shape(Shape::cuboid(0.5, 1.0, 0.02)));
+/// let wall = world.insert(Body::fixed().shape(Shape::cuboid(0.1, 2.0, 2.0)));
+/// let door = world.insert(Body::dynamic().position(0.6, 0.0, 0.0).shape(Shape::cuboid(0.5, 1.0, 0.02)));
 /// let edges = (Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.1, 0.0, 0.0));
-/// world.join(Joint::new(door, edges.0, wall, edges.1).hinge(Vec3::Y).limited(0.0, 1.5).motor(0.3, 20.0));
+/// world.insert_joint(Joint::new(door, edges.0, wall, edges.1).hinge(Vec3::Y).limited(0.0, 1.5).motor(0.3, 20.0));
 /// ```
 ///
 /// ```
@@ -384,7 +384,7 @@ impl Joint {
     /// use drystone::{Body, Joint, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
     ///
     /// let mut world = World::new();
-    /// let lamp = world.add(Body::dynamic().shape(Shape::ball(0.1)));
+    /// let lamp = world.insert(Body::dynamic().shape(Shape::ball(0.1)));
     /// let hook = world.insert_joint(Joint::to_world(lamp, Vec3::ZERO, Vec3::ZERO).enabled(false));
     /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// simulation.step(0.1)?;

@@ -146,10 +146,10 @@ impl Axis {
     ///
     /// // 2 kg on a spring of 400 N/m: it stretches by 2 g/400.
     /// let mut world = World::new();
-    /// let lamp = world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0));
+    /// let lamp = world.insert(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0));
     /// assert_eq!(Axis::FREE.spring_damper(0.0, 400.0, 40.0, f32::MAX).bounds, Axis::FREE.bounds);
     /// let slider = Joint::to_world(lamp, Vec3::ZERO, Vec3::ZERO).slider(Vec3::Y);
-    /// world.join(slider.spring_damper(0.0, 400.0, 40.0));
+    /// world.insert_joint(slider.spring_damper(0.0, 400.0, 40.0));
     /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
     /// (0..180).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
     /// assert!((simulation.world.bodies[lamp].position.y + 0.04905).abs() < 1e-3);

@@ -18,7 +18,7 @@ use crate::math::rotation::{product, unit};
 ///
 /// let mut world = World::new();
 /// let door = Body::dynamic().shape(Shape::cuboid(0.5, 1.0, 0.02)).rotation(Quat::from_rotation_y(0.3));
-/// let door = world.add(door.velocity(Vec3::ZERO, Vec3::Y * 2.0));
+/// let door = world.insert(door.velocity(Vec3::ZERO, Vec3::Y * 2.0));
 /// let hinge = Joint::to_world(door, Vec3::ZERO, Vec3::ZERO).hinge(Vec3::Y);
 /// let JointMotion { position, speed, .. } = world.joint_motion(&hinge);
 /// // The angle about the first axis, and its change.
@@ -53,7 +53,7 @@ impl World {
     /// ```
     /// # use drystone::{Body, Joint, Shape, World, glam::Vec3};
     /// let mut world = World::new();
-    /// let lift = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
+    /// let lift = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
     /// let slider = Joint::to_world(lift, Vec3::ZERO, Vec3::ZERO).slider(Vec3::Y);
     /// assert!((world.joint_motion(&slider).position[0] - 2.0).abs() < 1e-6);
     /// ```
@@ -142,7 +142,7 @@ impl Joint {
     /// ```
     /// use drystone::{Body, Joint, World, glam::Vec3};
     ///
-    /// let body = World::new().add(Body::dynamic());
+    /// let body = World::new().insert(Body::dynamic());
     /// let hinge = |axis| Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).hinge(axis).check_axes();
     /// assert!(hinge(Vec3::Y).is_ok() && hinge(Vec3::ZERO).is_err());
     /// ```
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn speeds_are_the_changes_of_angles_at_any_angle() {
         let mut world = World::new();
-        let body = world.add(crate::Body::dynamic().shape(crate::Shape::ball(0.5)));
+        let body = world.insert(crate::Body::dynamic().shape(crate::Shape::ball(0.5)));
         let joint = Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::FREE; 3], [Axis::LOCKED; 3]);
         for swing in [Vec3::ZERO, Vec3::new(0.0, 0.4, -0.3), Vec3::new(0.0, -1.2, 0.8), Vec3::new(0.0, 0.7, 2.4)] {
             let rotation = Quat::from_scaled_axis(swing) * Quat::from_rotation_x(0.6);

@@ -14,7 +14,7 @@ use super::tag::WorldTag;
 /// use drystone::{Body, Joint, JointHandle, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// let body = world.add(Body::fixed());
+/// let body = world.insert(Body::fixed());
 /// let handle: JointHandle = world.insert_joint(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO));
 /// assert!(world.joint(handle).is_some());
 /// world.remove_joint(handle);
@@ -45,7 +45,7 @@ crate::saved::fields!(JointHandle { number, generation } scratch { tag });
 /// use drystone::{Body, Joint, World, glam::Vec3, world::Joints};
 ///
 /// let mut world = World::new();
-/// let body = world.add(Body::fixed());
+/// let body = world.insert(Body::fixed());
 /// let [a, b] = [1.0, 2.0].map(|y| world.insert_joint(Joint::to_world(body, Vec3::ZERO, Vec3::Y * y)));
 /// let joints: &mut Joints = &mut world.joints;
 /// assert_eq!(joints.handles(), [a, b]);
@@ -167,6 +167,29 @@ impl IndexMut<usize> for Joints {
     fn index_mut(&mut self, index: usize) -> &mut Joint {
         &mut self.all[index]
     }
+}
+
+/// # Panics
+/// The joint is gone. [`World::joint`](super::World::joint) returns `None` instead.
+impl Index<JointHandle> for Joints {
+    type Output = Joint;
+    fn index(&self, handle: JointHandle) -> &Joint {
+        &self.all[self.index(handle).unwrap_or_else(|| gone(handle))]
+    }
+}
+
+/// # Panics
+/// The joint is gone. [`World::joint_mut`](super::World::joint_mut) returns `None` instead.
+impl IndexMut<JointHandle> for Joints {
+    fn index_mut(&mut self, handle: JointHandle) -> &mut Joint {
+        let index = self.index(handle).unwrap_or_else(|| gone(handle));
+        &mut self.all[index]
+    }
+}
+
+#[cold]
+fn gone(handle: JointHandle) -> ! {
+    panic!("{handle:?} names no joint of this world")
 }
 
 impl<'a> IntoIterator for &'a Joints {

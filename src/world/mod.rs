@@ -58,14 +58,15 @@ use tag::WorldTag;
 /// use drystone::{Body, Joint, Shape, World, glam::Vec3};
 ///
 /// let mut world = World::new();
-/// let [a, b] = [0.0, 2.0].map(|x| world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).position(x, 1.0, 0.0)));
+/// let [a, b] = [0.0, 2.0].map(|x| world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(1.0).position(x, 1.0, 0.0)));
 /// world.bodies[a].linear_velocity = Vec3::X;
 /// // Joints have handles too. Their index changes when an earlier joint is removed.
 /// let rod = world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).rod(1.9));
 /// world.joint_mut(rod).expect("just put in").break_force = 100.0;
 /// assert_eq!(world.anchors(world.joint(rod).expect("still there")), [Vec3::Y, Vec3::new(2.0, 1.0, 0.0)]);
 /// assert!((world.joint_gap() - 0.1).abs() < 1e-6);
-/// assert_eq!(world.join(Joint::to_world(b, Vec3::ZERO, Vec3::Y).rope(5.0)), 1);
+/// let rope = world.insert_joint(Joint::to_world(b, Vec3::ZERO, Vec3::Y).rope(5.0));
+/// assert_eq!(world.joints.index(rope), Some(1));
 /// world.remove_joint(rod);
 /// world.check()?;
 ///
@@ -77,7 +78,7 @@ use tag::WorldTag;
 /// // A second world beside the first. Its bodies never meet those of the first.
 /// world.beside(&World::new());
 /// let other = world.insert_in(1, Body::fixed())?;
-/// assert_eq!((world.world_count(), world.worlds()[1].clone()), (2, vec![other.index()]));
+/// assert_eq!((world.world_count(), world.worlds()[1].clone()), (2, vec![other]));
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Debug)]
@@ -116,19 +117,18 @@ impl World {
 
     /// Acceleration of a body by gravity (m/s²): the gravity of its world times [`Body::gravity_scale`], or zero if the
     /// body is not dynamic.
-    pub fn gravity_on(&self, body: usize) -> Vec3 {
-        match self.bodies.get(body) {
-            Some(&Body { kind: BodyKind::Dynamic, gravity_scale, .. }) => {
-                self.gravity_of(self.bodies.worlds()[body] as usize) * gravity_scale
+    pub fn gravity_on(&self, body: BodyHandle) -> Vec3 {
+        self.bodies.index_of(body).map_or(Vec3::ZERO, |index| self.gravity_at(index))
+    }
+
+    /// [`World::gravity_on`] the body at an index.
+    pub(crate) fn gravity_at(&self, index: usize) -> Vec3 {
+        match self.bodies[index] {
+            Body { kind: BodyKind::Dynamic, gravity_scale, .. } => {
+                self.gravity_of(self.bodies.worlds()[index] as usize) * gravity_scale
             }
             _ => Vec3::ZERO,
         }
-    }
-
-    /// Adds a body to the last world and returns its index. [`World::insert`] returns its handle instead. If bodies are
-    /// removed, an index does not distinguish a body from the next body at the same index.
-    pub fn add(&mut self, body: Body) -> usize {
-        self.insert(body).index()
     }
 
     /// Adds a body to the last world and returns its handle.
@@ -163,12 +163,6 @@ impl World {
     /// A mutable body, or `None` if it is gone.
     pub fn body_mut(&mut self, body: BodyHandle) -> Option<&mut Body> {
         self.bodies.index_of(body).map(|index| &mut self.bodies[index])
-    }
-
-    /// Adds a joint and returns its index. [`World::insert_joint`] returns its handle instead.
-    pub fn join(&mut self, joint: Joint) -> usize {
-        self.insert_joint(joint);
-        self.joints.len() - 1
     }
 
     /// Adds a joint and returns its handle. [`World::check`] and the next step refuse an invalid joint, for example to
@@ -235,11 +229,11 @@ impl World {
         self.bodies.world_count()
     }
 
-    /// The indices of the bodies of each world, ascending.
-    pub fn worlds(&self) -> Vec<Vec<usize>> {
+    /// The bodies of each world, ascending by index.
+    pub fn worlds(&self) -> Vec<Vec<BodyHandle>> {
         let mut worlds = vec![Vec::new(); self.world_count()];
-        let own = |&(i, _): &(usize, &u32)| !self.bodies.is_vacant(i);
-        self.bodies.worlds().iter().enumerate().filter(own).for_each(|(i, &world)| worlds[world as usize].push(i));
+        let numbers = self.bodies.worlds();
+        self.bodies.handles().for_each(|body| worlds[numbers[body.index()] as usize].push(body));
         worlds
     }
 
@@ -326,8 +320,8 @@ impl World {
     /// use drystone::{Body, Joint, World, glam::Vec3};
     ///
     /// let mut world = World::new();
-    /// let body = world.add(Body::dynamic());
-    /// world.join(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO));
+    /// let body = world.insert(Body::dynamic());
+    /// world.insert_joint(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO));
     /// assert!(world.check_joints().is_ok());
     /// world.joints[0].anchor_a.x = f32::NAN;
     /// assert!(world.check_joints().is_err());
@@ -362,8 +356,8 @@ impl World {
     }
 
     /// The first body whose pose or velocity is not finite.
-    pub fn first_non_finite(&self) -> Option<usize> {
-        self.bodies.iter().position(|b| !b.is_finite())
+    pub fn first_non_finite(&self) -> Option<BodyHandle> {
+        self.bodies.handles().find(|&handle| !self.bodies[handle].is_finite())
     }
 
     /// Sum of the kinetic energies of the dynamic bodies (J), in f64.
@@ -374,7 +368,7 @@ impl World {
     /// Sum of the potential energies of the dynamic bodies (J), zero at the origin, in f64.
     pub fn potential_energy(&self) -> f64 {
         let of = |(i, b): (usize, &Body)| {
-            -f64::from(b.mass.mass) * self.gravity_on(i).as_dvec3().dot(b.center_of_mass().as_dvec3())
+            -f64::from(b.mass.mass) * self.gravity_at(i).as_dvec3().dot(b.center_of_mass().as_dvec3())
         };
         self.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic).map(of).sum()
     }

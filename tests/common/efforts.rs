@@ -13,17 +13,17 @@ pub fn islands() -> Scene {
             Scene::find("tower", &["n=6".into(), format!("top_ratio={ratio}")]).expect("a scene of the catalogue");
         for mut body in tower.world.bodies {
             body.position.x += x;
-            scene.world.add(body);
+            scene.world.insert(body);
         }
     }
-    let hung = scene.world.add(Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(40.0, 5.0, 0.0));
-    scene.world.join(Joint::to_world(hung, 0.3 * Vec3::Y, Vec3::new(40.0, 5.3, 0.0)));
+    let hung = scene.world.insert(Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(40.0, 5.0, 0.0));
+    scene.world.insert_joint(Joint::to_world(hung, 0.3 * Vec3::Y, Vec3::new(40.0, 5.3, 0.0)));
     add_chain(&mut scene, Vec3::new(50.0, 40.0, 0.0));
     // Of this one the heavy end presses on a box that lies on a box.
     add_chain(&mut scene, Vec3::new(70.0, 1.2, 0.0));
     for level in 0..2 {
         let cube = Body::dynamic().shape(Shape::cuboid(0.25, 0.25, 0.25)).density(100.0);
-        scene.world.add(cube.position(70.0 + LINKS as f32 * LINK + ARM, 0.25 + 0.5 * level as f32, 0.0));
+        scene.world.insert(cube.position(70.0 + LINKS as f32 * LINK + ARM, 0.25 + 0.5 * level as f32, 0.0));
     }
     scene
 }
@@ -42,8 +42,8 @@ fn add_chain(scene: &mut Scene, anchor: Vec3) {
     let mut before = None;
     for k in 0..LINKS {
         let Vec3 { x, y, z } = anchor + (k as f32 + 0.5) * LINK * Vec3::X;
-        let body = scene.world.add(link.clone().position(x, y, z));
-        scene.world.join(match before {
+        let body = scene.world.insert(link.clone().position(x, y, z));
+        scene.world.insert_joint(match before {
             None => Joint::to_world(body, -0.5 * LINK * Vec3::X, anchor),
             Some(before) => Joint::new(before, 0.5 * LINK * Vec3::X, body, -0.5 * LINK * Vec3::X),
         });
@@ -51,6 +51,6 @@ fn add_chain(scene: &mut Scene, anchor: Vec3) {
     }
     let Vec3 { x, y, z } = anchor + (LINKS as f32 * LINK + ARM) * Vec3::X;
     let ball = Body::dynamic().shape(Shape::ball(0.2)).total_mass(1000.0 * link.mass.mass).position(x, y, z);
-    let end = scene.world.add(ball);
-    scene.world.join(Joint::new(before.expect("a link"), 0.5 * LINK * Vec3::X, end, -ARM * Vec3::X));
+    let end = scene.world.insert(ball);
+    scene.world.insert_joint(Joint::new(before.expect("a link"), 0.5 * LINK * Vec3::X, end, -ARM * Vec3::X));
 }

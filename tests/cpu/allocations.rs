@@ -13,7 +13,7 @@ fn allocations(threads: usize, config: SolverConfig, listens: bool) -> [usize; 2
     counting::in_pool(threads, || {
         let mut scene = Scene::find("pile", &["n=500".into()]).expect("the scene");
         if listens {
-            scene.world.add(Body::fixed().sensor(Shape::ball(3.0)));
+            scene.world.insert(Body::fixed().sensor(Shape::ball(3.0)));
         }
         let mut simulation = Simulation::with(scene.world, config, Box::new(Cpu::new())).expect("good settings");
         if listens {
@@ -64,9 +64,9 @@ fn a_small_simulation_allocates_in_its_first_step_alone() {
         let mut asked = [0; 2];
         for simulation_number in 0..20 {
             let mut world = World::new();
-            world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+            world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
             for i in 0..10 {
-                world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
+                world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
             }
             let mut simulation = Simulation::new(world).expect("a good world");
             for of_step in &mut asked {

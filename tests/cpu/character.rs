@@ -55,7 +55,7 @@ impl Walk {
 
 fn floor() -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     world
 }
 
@@ -85,7 +85,7 @@ fn grounds() -> Vec<(&'static str, Body)> {
 fn on_level_ground_of_any_kind_it_walks_at_its_speed_and_height() {
     for (name, ground) in grounds() {
         let mut world = World::new();
-        world.add(ground);
+        world.insert(ground);
         let mut walk = Walk::at(world, Vec3::new(-5.0, MIDDLE, 0.3));
         for _ in 0..120 {
             let before = walk.position();
@@ -104,7 +104,7 @@ fn ramp(degrees: f32) -> World {
     let mut world = floor();
     let turn = Quat::from_rotation_z(degrees.to_radians());
     let middle = turn * Vec3::new(10.0, -0.5, 0.0);
-    world.add(block(Vec3::new(10.0, 0.5, 5.0), middle).rotation(turn));
+    world.insert(block(Vec3::new(10.0, 0.5, 5.0), middle).rotation(turn));
     world
 }
 
@@ -191,7 +191,7 @@ fn steps_up_to_the_limit_are_climbed_and_higher_ones_are_walls() {
     for share in [0.3, 0.6, 0.9, 0.98] {
         let height = share * STEP;
         let mut world = floor();
-        world.add(block(Vec3::new(2.0, 0.5 * height, 5.0), Vec3::new(3.0, 0.5 * height, 0.0)));
+        world.insert(block(Vec3::new(2.0, 0.5 * height, 5.0), Vec3::new(3.0, 0.5 * height, 0.0)));
         let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
         for k in 0..120 {
             assert!(walk.step(1.5 * Vec3::X).ground.is_some(), "{share} of a step: in the air in step {k}");
@@ -202,7 +202,7 @@ fn steps_up_to_the_limit_are_climbed_and_higher_ones_are_walls() {
     for share in [1.02, 1.2, 2.0] {
         let height = share * STEP;
         let mut world = floor();
-        world.add(block(Vec3::new(2.0, 0.5 * height, 5.0), Vec3::new(3.0, 0.5 * height, 0.0)));
+        world.insert(block(Vec3::new(2.0, 0.5 * height, 5.0), Vec3::new(3.0, 0.5 * height, 0.0)));
         let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
         walk.steps(120, 1.5 * Vec3::X);
         assert!(walk.position().distance(Vec3::new(1.0 - RADIUS, MIDDLE, 0.0)) < 0.02, "{share}: {}", walk.position());
@@ -213,7 +213,7 @@ fn stairs(rise: f32, count: usize) -> World {
     let mut world = floor();
     for k in 0..count {
         let half = 0.5 * rise * (k + 1) as f32;
-        world.add(block(Vec3::new(0.15, half, 2.0), Vec3::new(0.5 + 0.3 * k as f32, half, 0.0)));
+        world.insert(block(Vec3::new(0.15, half, 2.0), Vec3::new(0.5 + 0.3 * k as f32, half, 0.0)));
     }
     world
 }
@@ -256,8 +256,8 @@ fn it_falls_jumps_and_lands_like_a_stone() {
 #[test]
 fn a_ceiling_ends_a_jump_and_a_low_one_stops_the_walk() {
     let mut world = floor();
-    world.add(block(Vec3::new(5.0, 0.5, 5.0), Vec3::new(0.0, HEIGHT + 0.5 + 0.3, 0.0)));
-    world.add(block(Vec3::new(1.0, 0.5, 5.0), Vec3::new(3.0, HEIGHT + 0.4, 0.0)));
+    world.insert(block(Vec3::new(5.0, 0.5, 5.0), Vec3::new(0.0, HEIGHT + 0.5 + 0.3, 0.0)));
+    world.insert(block(Vec3::new(1.0, 0.5, 5.0), Vec3::new(3.0, HEIGHT + 0.4, 0.0)));
     let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
     walk.step(Vec3::ZERO);
     walk.character.launch(6.0 * Vec3::Y);
@@ -280,7 +280,7 @@ fn a_ceiling_ends_a_jump_and_a_low_one_stops_the_walk() {
 fn it_slides_along_a_wall_by_the_part_of_its_walk_along_it() {
     let mut world = floor();
     let turn = Quat::from_rotation_y(0.5);
-    world.add(block(Vec3::new(0.5, 2.0, 20.0), 2.0 * Vec3::Y + 3.0 * Vec3::X).rotation(turn));
+    world.insert(block(Vec3::new(0.5, 2.0, 20.0), 2.0 * Vec3::Y + 3.0 * Vec3::X).rotation(turn));
     let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
     walk.steps(120, 2.0 * Vec3::X);
     let before = walk.position();
@@ -329,7 +329,7 @@ fn it_stays_where_it_stands_on_what_moves_and_turns() {
 #[test]
 fn a_jump_keeps_the_velocity_of_the_deck() {
     let mut world = World::new();
-    world.add(Body::kinematic().shape(Shape::cuboid(3.0, 0.2, 3.0)).velocity(5.0 * Vec3::X, Vec3::ZERO));
+    world.insert(Body::kinematic().shape(Shape::cuboid(3.0, 0.2, 3.0)).velocity(5.0 * Vec3::X, Vec3::ZERO));
     let mut walk = Walk::at(world, (0.2 + MIDDLE) * Vec3::Y);
     walk.step(Vec3::ZERO);
     walk.step(Vec3::ZERO);
@@ -343,7 +343,7 @@ fn a_jump_keeps_the_velocity_of_the_deck() {
 fn it_goes_out_of_the_way_of_what_is_driven_at_it() {
     let mut world = floor();
     let wall = Body::kinematic().shape(Shape::cuboid(0.2, 2.0, 2.0)).position(-1.0, 2.0, 0.0);
-    world.add(wall.velocity(2.0 * Vec3::X, Vec3::ZERO));
+    world.insert(wall.velocity(2.0 * Vec3::X, Vec3::ZERO));
     let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
     walk.steps(120, Vec3::ZERO);
     let gap = walk.position().x - RADIUS - (-1.0 + 0.2 + 4.0);
@@ -409,13 +409,13 @@ fn room(random: &mut Random) -> (World, Vec3) {
     let mut world = floor();
     for side in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y] {
         let half = 0.02 * side.abs() + 4.0 * (Vec3::ONE - side.abs());
-        world.add(block(half, 4.0 * side + 2.0 * Vec3::Y));
+        world.insert(block(half, 4.0 * side + 2.0 * Vec3::Y));
     }
     for _ in 0..14 {
         let half = Vec3::from_array([0; 3].map(|_| random.within(0.02, 1.0)));
         let place = random.vector(3.5) + 1.5 * Vec3::Y;
         let turn = if random.happens(0.4) { random.rotation() } else { Quat::from_rotation_y(random.within(0.0, 3.0)) };
-        world.add(block(half, place).rotation(turn));
+        world.insert(block(half, place).rotation(turn));
     }
     let capsule = Shape::capsule(0.5 * HEIGHT - RADIUS + MARGIN, RADIUS + MARGIN);
     let mut draw = || Vec3::new(random.within(-3.6, 3.6), random.within(1.0, 3.0), random.within(-3.6, 3.6));
@@ -494,7 +494,7 @@ fn a_character_of_any_size_walks_alike() {
     let path = |size: f32| {
         let mut world = floor();
         world.gravity *= size;
-        world.add(block(size * Vec3::new(2.0, 0.1, 5.0), size * Vec3::new(3.0, 0.1, 0.0)));
+        world.insert(block(size * Vec3::new(2.0, 0.1, 5.0), size * Vec3::new(3.0, 0.1, 0.0)));
         let capsule = Shape::capsule(size * (0.5 * HEIGHT - RADIUS), size * RADIUS);
         let mut walk = Walk::with(world, Body::kinematic().shape(capsule).position(0.0, size * MIDDLE, 0.0));
         walk.steps(90, 1.5 * size * Vec3::X);
@@ -513,8 +513,8 @@ fn other_shapes_walk_too() {
         ("cylinder", Shape::cylinder(0.9, 0.3), 0.9),
     ] {
         let mut world = floor();
-        world.add(block(Vec3::new(2.0, 0.05, 5.0), Vec3::new(3.0, 0.05, 0.0)));
-        world.add(block(Vec3::new(0.5, 2.0, 5.0), Vec3::new(4.5, 2.0, 0.0)));
+        world.insert(block(Vec3::new(2.0, 0.05, 5.0), Vec3::new(3.0, 0.05, 0.0)));
+        world.insert(block(Vec3::new(0.5, 2.0, 5.0), Vec3::new(4.5, 2.0, 0.0)));
         let margin = 0.02 * shape.smallest_half_extent();
         let mut walk = Walk::with(world, Body::kinematic().shape(shape).position(0.0, half + margin, 0.0));
         let movement = walk.steps(240, Vec3::new(2.0, 0.0, 0.5));
@@ -529,7 +529,7 @@ fn between_two_steep_slopes_it_stands() {
     let mut world = World::new();
     for side in [1.0, -1.0] {
         let turn = Quat::from_rotation_z(side * 1.0);
-        world.add(block(Vec3::new(3.0, 0.5, 5.0), turn * Vec3::new(side * 2.9, -0.5, 0.0)).rotation(turn));
+        world.insert(block(Vec3::new(3.0, 0.5, 5.0), turn * Vec3::new(side * 2.9, -0.5, 0.0)).rotation(turn));
     }
     let mut walk = Walk::at(world, 3.0 * Vec3::Y);
     let movement = walk.steps(120, Vec3::ZERO);
@@ -572,7 +572,7 @@ fn a_belt_takes_a_character_along_and_its_walk_adds_to_that() {
     let belt = Body::fixed().shape(Shape::cuboid(20.0, 0.5, 2.0)).position(0.0, -0.5, 0.0);
     let mut belt = belt.rotation(Quat::from_rotation_y(0.4));
     belt.material.surface_velocity = Vec3::X * 1.5;
-    world.add(belt);
+    world.insert(belt);
     let along = Quat::from_rotation_y(0.4) * Vec3::X;
     let mut walk = Walk::at(world, Vec3::Y * (MIDDLE + 0.01));
     walk.steps(30, Vec3::ZERO);

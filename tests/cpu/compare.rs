@@ -212,9 +212,9 @@ fn a_difference_that_heals_is_still_told_with_its_step_its_body_and_both_values(
     use drystone::{Body, Shape, World};
     let mut world = World::new();
     world.gravity = drystone::glam::Vec3::ZERO;
-    world.add(Body::fixed().shape(Shape::ball(1.0)).position(9.0, 0.0, 0.0));
+    world.insert(Body::fixed().shape(Shape::ball(1.0)).position(9.0, 0.0, 0.0));
     // So far away that half a meter a second for seventeen steps is less than a last bit of the position.
-    world.add(Body::dynamic().shape(Shape::ball(1.0)).position(0.0, 0.0, 1e9));
+    world.insert(Body::dynamic().shape(Shape::ball(1.0)).position(0.0, 0.0, 1e9));
     let scene = Scene { world, ..pile() };
     let mut open =
         |which| -> Result<Box<dyn Backend>> { Ok(if which == 0 { reference() } else { Box::new(Healing(0)) }) };
@@ -234,7 +234,7 @@ fn a_body_that_is_in_one_world_only_differs() {
     let gone = fewer.bodies.handle(7).expect("a box");
     fewer.remove(gone);
     let mut more = world.clone();
-    more.add(drystone::Body::dynamic().shape(drystone::Shape::ball(1.0)));
+    more.insert(drystone::Body::dynamic().shape(drystone::Shape::ball(1.0)));
     for (other, body, values) in [(&fewer, 7, [1.0, 0.0]), (&more, world.bodies.len(), [0.0, 1.0])] {
         assert_eq!(Difference::between(&world, other).bodies, 1);
         let first = BodyDifference { body, quantity: "presence", values };

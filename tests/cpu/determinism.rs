@@ -177,7 +177,7 @@ fn what_a_reused_contact_carries_stays_with_it() {
                 .map(|m| {
                     let key = m.points().iter().map(|p| arms(p.r_a.into(), p.r_b.into())).collect();
                     let values = m.points().iter().map(|p| [p.separation, m.preload, p.normal_impulse]).collect();
-                    ((m.body_a as u32, m.body_b as u32, key), values)
+                    ((m.a.body.index() as u32, m.b.body.index() as u32, key), values)
                 })
                 .collect();
             assert_eq!(solved, read, "step {step}");

@@ -404,7 +404,7 @@ fn run(shape: &str, kind: &str, count: usize, seed: u64) -> Outcome {
     let dt = if size < 0.12 { 1.0 / 120.0 } else { 1.0 / 60.0 };
     let (terrain, floor) = floor(kind, size, &mut random);
     let mut world = World::new();
-    world.add(floor);
+    world.insert(floor);
     let (rows, pitch) = (8, 4.0 * size);
     // Away from the middle too, but not so far that single precision ends.
     let middle = random.between(-0.05, 0.05) * terrain.side.min(100.0 * size);
@@ -418,7 +418,7 @@ fn run(shape: &str, kind: &str, count: usize, seed: u64) -> Outcome {
             place.y = place.x;
         }
         let (drop, body) = drop(shape, size, place, &terrain, dt, &mut random);
-        world.add(body);
+        world.insert(body);
         drops.push(drop);
     }
     let config = SolverConfig::default().without_sleep();
@@ -442,9 +442,9 @@ fn run(shape: &str, kind: &str, count: usize, seed: u64) -> Outcome {
             drop.sunk = if step + 60 < STEPS { f64::INFINITY } else { drop.sunk.min(beyond) };
             if terrain.plane.is_some() {
                 let mut alone = World::new();
-                alone.add(floor.clone());
+                alone.insert(floor.clone());
                 // As it stands, wherever it goes.
-                alone.add(body.clone().velocity(Vec3::ZERO, Vec3::ZERO));
+                alone.insert(body.clone().velocity(Vec3::ZERO, Vec3::ZERO));
                 let reported = Penetration::of_world(&alone, &config).max;
                 drop.wrong = drop.wrong.max((reported - depth).abs() / drop.thickness);
             }
@@ -509,9 +509,9 @@ fn thousands_of_every_shape_dropped_on_every_floor_rest_on_it() {
 /// Where a body that starts at 4 m/s on a floor is after a second, and its greatest height above where it began [m].
 fn slid(floor: Shape, shape: Shape, height: f32, friction: f32) -> (f32, f32) {
     let mut world = World::new();
-    world.add(Body::fixed().shape(floor).friction(friction));
+    world.insert(Body::fixed().shape(floor).friction(friction));
     let body = Body::dynamic().shape(shape).friction(friction).position(-3.0, height, 0.05);
-    world.add(body.velocity(Vec3::new(4.0, 0.0, 0.3), Vec3::ZERO));
+    world.insert(body.velocity(Vec3::new(4.0, 0.0, 0.3), Vec3::ZERO));
     let mut simulation =
         Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let mut highest = 0.0_f32;

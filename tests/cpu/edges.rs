@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use drystone::glam::{IVec3, Quat, Vec3};
-use drystone::{Body, Cpu, Groups, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Cpu, Groups, Shape, Simulation, SolverConfig, World};
 
 use crate::common::sample::is_full;
 
@@ -71,7 +71,7 @@ impl Floor {
         let lay = |world: &mut World, tile: &dyn Fn(usize) -> fn(Vec3) -> Tile| {
             for (k, z) in (0..EDGES).flat_map(|k| lanes.map(|z| (k, z))) {
                 let (shape, at) = tile(k)(Vec3::new(edge(k), 0.0, z));
-                world.add(Body::fixed().shape(shape).position(at.x, at.y, at.z).friction(1.0));
+                world.insert(Body::fixed().shape(shape).position(at.x, at.y, at.z).friction(1.0));
             }
         };
         match self {
@@ -80,7 +80,7 @@ impl Floor {
                 lay(&mut world, &|k| [mesh_tile, box_tile, field_tile, mesh_tile, field_tile, box_tile][k % 6])
             }
             Self::Carpet => {
-                world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(1.0));
+                world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(1.0));
                 lay(&mut world, &|_| mesh_tile);
             }
             Self::Junctions => {
@@ -95,7 +95,7 @@ impl Floor {
                 };
                 let cells = (0..EDGES).flat_map(|k| [cell(0, k), cell(2 * (EDGES + 1), k)].concat());
                 let mesh = Shape::mesh(vertices, cells.collect()).expect("a mesh");
-                world.add(Body::fixed().shape(mesh).friction(1.0));
+                world.insert(Body::fixed().shape(mesh).friction(1.0));
             }
             Self::Mesh => {
                 let line = |k: usize| [-HALF_WIDTH, 0.0, HALF_WIDTH].map(|z| Vec3::new(edge(k), 0.0, z));
@@ -110,29 +110,29 @@ impl Floor {
                 };
                 let triangles = (0..EDGES).flat_map(|k| [cell(k, 0), cell(k, 1)].concat()).collect();
                 let mesh = Shape::mesh(vertices, triangles).expect("a mesh");
-                world.add(Body::fixed().shape(mesh).friction(1.0));
+                world.insert(Body::fixed().shape(mesh).friction(1.0));
             }
             Self::HeightField => {
                 let heights = vec![vec![0.0; EDGES + 1]; 3];
                 let field = Shape::height_field(&heights, Vec3::new(length, 1.0, 2.0 * HALF_WIDTH)).expect("a field");
-                world.add(Body::fixed().shape(field).friction(1.0));
+                world.insert(Body::fixed().shape(field).friction(1.0));
             }
             Self::Boxes => {
                 for (k, z) in (0..EDGES).flat_map(|k| lanes.map(|z| (k, z))) {
                     let Vec3 { x, y, z } = middle(k, z);
-                    world.add(Body::fixed().shape(brick()).position(x, y, z).friction(1.0));
+                    world.insert(Body::fixed().shape(brick()).position(x, y, z).friction(1.0));
                 }
             }
             Self::Parts => {
                 let all = (0..EDGES).flat_map(|k| lanes.map(|z| middle(k, z)));
                 let body = all.fold(Body::fixed(), |body, at| body.shape_at(brick(), at, Quat::IDENTITY));
-                world.add(body.friction(1.0));
+                world.insert(body.friction(1.0));
             }
             Self::Voxels => {
                 let half = EDGES as i32 / 2;
                 let cells: Vec<IVec3> = (-half..half).flat_map(|x| [-1, 0].map(|z| IVec3::new(x, -1, z))).collect();
                 let blocks = Shape::voxels(Vec3::new(PITCH, 1.0, HALF_WIDTH), &cells).expect("a mesh");
-                world.add(Body::fixed().shape(blocks).friction(1.0));
+                world.insert(Body::fixed().shape(blocks).friction(1.0));
             }
             Self::Tiles => {
                 for (k, z) in (0..EDGES).flat_map(|k| lanes.map(|z| (k, z))) {
@@ -140,7 +140,7 @@ impl Floor {
                     let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z);
                     let corners = vec![corner(0.0, near), corner(0.0, far), corner(PITCH, far), corner(PITCH, near)];
                     let tile = Shape::mesh(corners, vec![[0, 1, 2], [0, 2, 3]]).expect("a mesh");
-                    world.add(Body::fixed().shape(tile).position(edge(k), 0.0, 0.0).friction(1.0));
+                    world.insert(Body::fixed().shape(tile).position(edge(k), 0.0, 0.0).friction(1.0));
                 }
             }
         }
@@ -232,7 +232,7 @@ impl Case<'_> {
 /// Lets all travel over one floor at once.
 fn travel(floor: Floor, cases: &[Case]) -> Vec<Journey> {
     let mut world = floor.build();
-    let bodies: Vec<usize> = cases.iter().map(|case| world.add(case.body())).collect();
+    let bodies: Vec<BodyHandle> = cases.iter().map(|case| world.insert(case.body())).collect();
     let config = SolverConfig::default().without_sleep();
     let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a simulation");
     let mut journeys = vec![Journey { lost: f32::NAN, hop: 0.0 }; cases.len()];
@@ -389,9 +389,9 @@ fn depth(shape: &Shape, p: Vec3) -> f32 {
 fn deepest_at_rim(tiles: &[Tile], body: Body, shape: &Shape) -> (f32, Vec3) {
     let mut world = World::new();
     for (tile, at) in tiles {
-        world.add(Body::fixed().shape(tile.clone()).position(at.x, at.y, at.z).friction(0.5));
+        world.insert(Body::fixed().shape(tile.clone()).position(at.x, at.y, at.z).friction(0.5));
     }
-    let body = world.add(body.shape(shape.clone()).density(1000.0).friction(0.5));
+    let body = world.insert(body.shape(shape.clone()).density(1000.0).friction(0.5));
     let config = SolverConfig::default().without_sleep();
     let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a simulation");
     let mut deepest = f32::NEG_INFINITY;
@@ -467,11 +467,11 @@ fn a_wall_a_step_and_the_end_of_a_row_are_as_they_were() {
     let end = |build: fn(&mut World), shape: &Shape, speed: f32| {
         let mut world = World::new();
         for x in [-1.5, -0.5, 0.5, 1.5] {
-            world.add(Body::fixed().shape(Shape::cuboid(0.5, 0.5, 2.0)).position(x, -0.5, 0.0).friction(0.0));
+            world.insert(Body::fixed().shape(Shape::cuboid(0.5, 0.5, 2.0)).position(x, -0.5, 0.0).friction(0.0));
         }
         build(&mut world);
         let body = Body::dynamic().shape(shape.clone()).position(-1.0, SIZE, 0.0).velocity(speed * Vec3::X, Vec3::ZERO);
-        let body = world.add(body.friction(0.0));
+        let body = world.insert(body.friction(0.0));
         let config = SolverConfig::default().without_sleep();
         let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a simulation");
         for _ in 0..90 {
@@ -480,10 +480,10 @@ fn a_wall_a_step_and_the_end_of_a_row_are_as_they_were() {
         simulation.world.bodies[body].position
     };
     let wall = |world: &mut World| {
-        world.add(Body::fixed().shape(Shape::cuboid(0.5, 1.0, 2.0)).position(1.5, 1.0, 0.0));
+        world.insert(Body::fixed().shape(Shape::cuboid(0.5, 1.0, 2.0)).position(1.5, 1.0, 0.0));
     };
     let step = |world: &mut World| {
-        world.add(Body::fixed().shape(Shape::cuboid(0.5, 0.05, 2.0)).position(1.5, 0.05, 0.0));
+        world.insert(Body::fixed().shape(Shape::cuboid(0.5, 0.05, 2.0)).position(1.5, 0.05, 0.0));
     };
     for shape in [Shape::cuboid(SIZE, SIZE, SIZE), Shape::ball(SIZE), Shape::cylinder(SIZE, SIZE)] {
         for (build, most) in [(wall as fn(&mut World), 1.0 - SIZE), (step, 1.0)] {
@@ -492,5 +492,26 @@ fn a_wall_a_step_and_the_end_of_a_row_are_as_they_were() {
         }
         let at = end(|_| (), &shape, 4.0);
         assert!(at.x > 3.0 && at.y < -1.0, "{shape:?} falls off the end: {at}");
+    }
+}
+
+/// The normals of a ridge lie between those of its two faces. A ball on the ridge between a box and a mesh that slopes
+/// down from it presses along the line from the ridge to its center, on both.
+#[test]
+fn a_ridge_between_a_box_and_a_mesh_keeps_its_normals() {
+    for degrees in [10.0_f32, 22.5, 35.0] {
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        world.insert(Body::fixed().shape(Shape::cuboid(1.0, 0.5, 1.0)).position(-1.0, -0.5, 0.0));
+        let corners = [(0.0, -1.0), (0.0, 1.0), (2.0, 1.0), (2.0, -1.0)].map(|(x, z)| Vec3::new(x, -x, z));
+        let slope = Shape::mesh(corners.into(), vec![[0, 1, 2], [0, 2, 3]]).expect("a mesh");
+        world.insert(Body::fixed().shape(slope));
+        let (x, y) = degrees.to_radians().sin_cos();
+        let away = Vec3::new(x, y, 0.0);
+        let center = 0.199 * away;
+        world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(center.x, center.y, 0.0));
+        let mut simulation = Simulation::new(world).expect("a simulation");
+        simulation.step(DT).expect("a step");
+        let normals: Vec<Vec3> = simulation.contacts().map(|contact| contact.normal).collect();
+        assert!(!normals.is_empty() && normals.iter().all(|n| n.distance(away) < 1e-3), "{degrees}: {normals:?}");
     }
 }

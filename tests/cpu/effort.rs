@@ -5,7 +5,9 @@ use drystone::config::{Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{in_place, rms_speed};
 use drystone::stages::backend::CheckedStep;
-use drystone::{Backend, Body, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::{
+    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, StepProblem, World,
+};
 use drystone_conform::compare::compare;
 use drystone_scenes::Scene;
 
@@ -74,7 +76,7 @@ fn a_rod_takes_more_substeps_for_the_speed_across_it_and_a_slack_rope_none() {
 }
 
 /// Sets a cube of a thousand times the mass on a cube; the overlap after four seconds, and the substeps (m).
-fn loaded(simulation: &mut Simulation, cube: usize) -> (f64, u32) {
+fn loaded(simulation: &mut Simulation, cube: BodyHandle) -> (f64, u32) {
     let at = simulation.world.bodies[cube].position;
     let load = Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).density(1e6).position(at.x, at.y + 0.4, at.z);
     simulation.world.insert(load.velocity(1e-9 * Vec3::NEG_Y, Vec3::ZERO));
@@ -86,15 +88,15 @@ fn loaded(simulation: &mut Simulation, cube: usize) -> (f64, u32) {
 #[test]
 fn what_walls_hold_takes_no_more_substeps_than_its_weight_asks_for() {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let cube = world.add(Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(0.0, 0.2, 0.0));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let cube = world.insert(Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(0.0, 0.2, 0.0));
     let start = |world: World| {
         let config = SolverConfig::default().without_sleep();
         Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world")
     };
     let mut free = world.clone();
     let wall = |x: f32| Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0);
-    world.add(wall(-0.65));
+    world.insert(wall(-0.65));
     let right = world.insert(wall(0.65));
     let mut simulation = start(world);
     for step in 0..600 {
@@ -119,11 +121,11 @@ fn what_walls_hold_takes_no_more_substeps_than_its_weight_asks_for() {
 fn what_a_press_holds_lies_still_and_sleeps() {
     for (depth, density) in [(0.01, 1000.0), (0.05, 1000.0), (0.1, 10.0), (0.2, 1000.0), (0.35, 1e5), (0.35, 1.0)] {
         let mut world = World::new();
-        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+        world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
         let block = |body: Body| body.shape(Shape::cuboid(0.5, 0.5, 0.5));
-        let crate_ = world.add(block(Body::dynamic()).density(density).position(0.0, 0.5, 0.0));
+        let crate_ = world.insert(block(Body::dynamic()).density(density).position(0.0, 0.5, 0.0));
         let press =
-            world.add(block(Body::kinematic()).position(0.0, 1.55, 0.0).velocity(0.1 * Vec3::NEG_Y, Vec3::ZERO));
+            world.insert(block(Body::kinematic()).position(0.0, 1.55, 0.0).velocity(0.1 * Vec3::NEG_Y, Vec3::ZERO));
         let mut simulation = Simulation::new(world).expect("a good world");
         for step in 0..600 {
             if simulation.world.bodies[press].position.y < 1.5 - depth {
@@ -182,10 +184,10 @@ fn a_net_that_catches_a_heavy_ball_keeps_its_joints_closed() {
     let last: Vec<usize> = (0..world.bodies.len()).filter(|&i| world.bodies[i].position.z == far).collect();
     for i in last {
         let anchor = world.bodies[i].position + 0.25 * Vec3::Z;
-        world.join(Joint::to_world(i, 0.25 * Vec3::Z, anchor));
+        world.insert_joint(Joint::to_world(i, 0.25 * Vec3::Z, anchor));
     }
     let ball = world.bodies[0].clone().density(300_000.0).position(0.0, 1.6, 0.5 * far);
-    world.add(ball);
+    world.insert(ball);
     let largest_gap = |config: SolverConfig| {
         let mut simulation = Simulation::with(world.clone(), config, Box::new(Cpu::new())).expect("a world");
         (0..360).fold(0.0_f32, |gap, _| {
@@ -303,7 +305,7 @@ fn joints_that_are_solved_at_once_belong_to_the_block_of_their_bodies() {
 fn an_island_goes_up_with_a_load_and_down_after_it() {
     let mut scene = find("stack", &["n=6"]);
     let load = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).density(3e5).position(9.0, 0.5, 0.0);
-    let load = scene.world.add(load);
+    let load = scene.world.insert(load);
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 120);
     assert_eq!(most_substeps(&simulation), 8);
@@ -339,12 +341,12 @@ fn on_a_plate(speed: f32) -> Scene {
     let mut scene = find("tower", &["n=1"]);
     scene.world.bodies = Default::default();
     let plate = Body::kinematic().shape(Shape::cuboid(9.0, 0.5, 3.0)).position(0.0, -0.5, 0.0);
-    scene.world.add(plate.velocity(speed * Vec3::X, Vec3::ZERO));
+    scene.world.insert(plate.velocity(speed * Vec3::X, Vec3::ZERO));
     for (x, top) in [(-3.0, 1e6), (3.0, 1e3)] {
         for i in 0..5 {
             let density = if i == 4 { top } else { 1e3 };
             let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).density(density);
-            scene.world.add(cube.position(x, 0.5 + i as f32, 0.0).restitution(0.5));
+            scene.world.insert(cube.position(x, 0.5 + i as f32, 0.0).restitution(0.5));
         }
     }
     scene
@@ -368,8 +370,8 @@ fn a_plate_that_moves_ties_what_hangs_from_it() {
     let mut scene = on_a_plate(0.01);
     let at = scene.world.bodies[0].position + Vec3::new(0.0, -3.0, 0.0);
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z);
-    let rod = scene.world.add(rod);
-    scene.world.join(Joint::new(0, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
+    let rod = scene.world.insert(rod);
+    scene.world.insert_joint(Joint::new(0, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 10);
     assert_eq!(simulation.substeps_of(rod), simulation.substeps_of(0));
@@ -388,8 +390,8 @@ fn several_efforts_keep_what_backends_rely_on() {
     let top = scene.world.bodies.iter().position(|b| b.position.x == 20.0 && b.position.y > 5.0).expect("a top");
     let at = scene.world.bodies[top].position + Vec3::Y;
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y + 0.3, at.z);
-    let rod = scene.world.add(rod);
-    scene.world.join(Joint::new(top, Vec3::Y, rod, -0.3 * Vec3::Y));
+    let rod = scene.world.insert(rod);
+    scene.world.insert_joint(Joint::new(top, Vec3::Y, rod, -0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     for step in 0..5 {
         run(&mut simulation, 1);
@@ -449,8 +451,8 @@ fn the_impulse_of_a_joint_follows_the_class() {
     scene.world.bodies = scene.world.bodies.iter().take(6).cloned().collect();
     let at = scene.world.bodies[5].position + Vec3::Y;
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z + 2.0);
-    let rod = scene.world.add(rod);
-    scene.world.join(Joint::new(5, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
+    let rod = scene.world.insert(rod);
+    scene.world.insert_joint(Joint::new(5, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 60);
     let (before, substeps) = (simulation.joint_impulses()[0], most_substeps(&simulation));
@@ -476,11 +478,11 @@ fn a_pile_comes_to_rest() {
 #[test]
 fn a_sledge_comes_out_of_a_wall() {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::X)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::X)));
     let knob = Shape::cuboid(0.1, 0.1, 0.1);
     let sledge = Body::dynamic().shape(Shape::cuboid(1.0, 0.1, 0.5)).position(-3.0, 0.1, 0.0);
-    world.add(sledge.shape_at(knob, Vec3::new(0.9, 0.2, 0.0), Quat::IDENTITY));
+    world.insert(sledge.shape_at(knob, Vec3::new(0.9, 0.2, 0.0), Quat::IDENTITY));
     let mut simulation = Simulation::new(world).expect("a good world");
     run(&mut simulation, 60);
     let deepest = simulation.penetration().max;

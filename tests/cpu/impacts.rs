@@ -11,8 +11,8 @@ const DT: f32 = 1.0 / 60.0;
 fn fallen_flat(half_extents: Vec3, restitution: f32, height: f32) -> [f32; 4] {
     let Vec3 { x, y, z } = half_extents;
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(restitution));
-    let body = world.add(Body::dynamic().shape(Shape::cuboid(x, y, z)).restitution(restitution).position(
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(restitution));
+    let body = world.insert(Body::dynamic().shape(Shape::cuboid(x, y, z)).restitution(restitution).position(
         0.0,
         y + height,
         0.0,
@@ -90,8 +90,8 @@ fn blows_make_no_energy() {
         let falls = random.vector(3.0).with_y(random.within(-15.0, -2.0));
         let body = surface(Body::dynamic().shape(any_shape(&mut random)).density(1000.0));
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-        world.add(body.position(0.0, 2.5, 0.0).rotation(random.rotation()).velocity(falls, spin));
-        world.add(surface(match blow % 2 {
+        world.insert(body.position(0.0, 2.5, 0.0).rotation(random.rotation()).velocity(falls, spin));
+        world.insert(surface(match blow % 2 {
             0 => Body::fixed().shape(Shape::half_space(Vec3::Y)),
             _ => Body::dynamic().shape(any_shape(&mut random)).density(1000.0),
         }));
@@ -115,8 +115,8 @@ fn blows_make_no_energy() {
 #[test]
 fn a_ball_keeps_its_restitution_over_ten_bounces() {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(0.8));
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).restitution(0.8).position(0.0, 50.5, 0.0));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(0.8));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).restitution(0.8).position(0.0, 50.5, 0.0));
     let mut simulation = started(world);
     let (mut heights, mut highest, mut rose) = (Vec::new(), 0.0_f32, false);
     while heights.len() < 10 {
@@ -144,7 +144,7 @@ fn cubes_bounce_off_each_other_face_to_face() {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
         for (x, speed) in [-5.0, 5.0].into_iter().zip(speeds) {
             let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).restitution(restitution);
-            world.add(cube.position(x, 0.0, 0.0).velocity(Vec3::X * speed, Vec3::ZERO));
+            world.insert(cube.position(x, 0.0, 0.0).velocity(Vec3::X * speed, Vec3::ZERO));
         }
         let mut simulation = started(world);
         (0..90).for_each(|_| drop(simulation.step(DT).expect("a step")));

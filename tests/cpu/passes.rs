@@ -114,17 +114,17 @@ fn room(room: Room, thick: f32, meshes: &[Shape; 3]) -> World {
     for inward in SIDES {
         let [x, y, z] = (-HALF * inward).to_array();
         match room {
-            Room::HeightField if inward == Vec3::Y => world.add(Body::fixed().shape(meshes[2].clone())),
+            Room::HeightField if inward == Vec3::Y => world.insert(Body::fixed().shape(meshes[2].clone())),
             Room::HalfSpaces | Room::HeightField => {
-                world.add(Body::fixed().shape(Shape::half_space(inward)).position(x, y, z))
+                world.insert(Body::fixed().shape(Shape::half_space(inward)).position(x, y, z))
             }
             Room::Boxes | Room::Sheets => {
                 let half = inward.abs() * 0.5 * thick + (Vec3::ONE - inward.abs()) * (HALF + thick);
                 let [x, y, z] = (-inward * (HALF + 0.5 * thick)).to_array();
-                world.add(Body::fixed().shape(Shape::cuboid(half.x, half.y, half.z)).position(x, y, z))
+                world.insert(Body::fixed().shape(Shape::cuboid(half.x, half.y, half.z)).position(x, y, z))
             }
             Room::Mesh | Room::FineMesh if inward == Vec3::X => {
-                world.add(Body::fixed().shape(meshes[usize::from(room == Room::FineMesh)].clone()))
+                world.insert(Body::fixed().shape(meshes[usize::from(room == Room::FineMesh)].clone()))
             }
             Room::Mesh | Room::FineMesh => continue,
         };
@@ -227,7 +227,7 @@ fn crowd(number: u64, meshes: &[Shape; 3]) -> Option<String> {
             let [a, b] = [before, shot].map(|body| world.body(body).expect("a body"));
             let middle = a.position.midpoint(b.position);
             let anchors = [a, b].map(|body| body.rotation.inverse() * (middle - body.position));
-            world.join(Joint::new(before, anchors[0], shot, anchors[1]));
+            world.insert_joint(Joint::new(before, anchors[0], shot, anchors[1]));
         }
         shots.push(shot);
     }
@@ -314,7 +314,7 @@ fn what_joints_hold_together_passes_through_no_wall_and_gains_no_energy() {
         for number in (0..12).step_by(one_in(3)) {
             let mut random = Random(SplitMix64::new(number));
             let mut world = if number % 2 == 0 { weightless() } else { World::new() };
-            world.add(wall.clone());
+            world.insert(wall.clone());
             let (turn, spin) = (random.rotation(), 5.0 * random.vector());
             let velocity = speed * (Vec3::X + 0.5 * random.vector()).normalize();
             let links: Vec<BodyHandle> = (0..8)
@@ -327,7 +327,7 @@ fn what_joints_hold_together_passes_through_no_wall_and_gains_no_energy() {
                 })
                 .collect();
             for pair in links.windows(2) {
-                world.join(Joint::new(pair[0], 0.12 * Vec3::Y, pair[1], -0.12 * Vec3::Y));
+                world.insert_joint(Joint::new(pair[0], 0.12 * Vec3::Y, pair[1], -0.12 * Vec3::Y));
             }
             let mut simulation = simulation(world);
             let energy = |simulation: &Simulation| {
@@ -362,7 +362,7 @@ fn slabs_bricks_balls_and_coins_fall_onto_a_mesh_and_stay_there() {
     for (name, shape, height, tilt) in falling {
         for k in (0..20).step_by(one_in(3)) {
             let mut world = World::new();
-            world.add(Body::fixed().shape(ground.clone()));
+            world.insert(Body::fixed().shape(ground.clone()));
             let falls = Body::dynamic().shape(shape.clone()).rotation(Quat::from_rotation_x(tilt));
             let falls = world.insert(falls.position(0.3, height + 0.011 * k as f32, 0.2));
             let mut simulation = simulation(world);
@@ -381,7 +381,7 @@ fn balls_at_5_to_1000_meters_a_second_stay_before_a_wall() {
         for speed in [5.0_f32, 20.0, 60.0, 100.0, 200.0, 1000.0] {
             for k in 0..10 {
                 let mut world = weightless();
-                world.add(Body::fixed().shape(Shape::cuboid(half, 5.0, 5.0)));
+                world.insert(Body::fixed().shape(Shape::cuboid(half, 5.0, 5.0)));
                 let x = -3.0 - speed * DT * (1.0 + 0.1 * k as f32);
                 let ball = Body::dynamic().shape(Shape::ball(radius)).position(x, 0.3, 0.0);
                 let ball = world.insert(ball.velocity(Vec3::X * speed, Vec3::ZERO));
@@ -402,10 +402,10 @@ fn a_bounce_within_a_step_ends_before_the_next_wall() {
     for k in 0..60 {
         let mut world = weightless();
         let sheet = |x: f32, z: f32| Body::fixed().shape(Shape::cuboid(x, 3.0, z)).restitution(1.0).friction(0.0);
-        world.add(sheet(0.0005, 3.0).position(3.0, 0.0, 0.0));
-        world.add(sheet(0.0005, 3.0).position(-3.0, 0.0, 0.0));
-        world.add(sheet(3.0, 0.0005).position(0.0, 0.0, 3.0));
-        world.add(sheet(3.0, 0.0005).position(0.0, 0.0, -3.0));
+        world.insert(sheet(0.0005, 3.0).position(3.0, 0.0, 0.0));
+        world.insert(sheet(0.0005, 3.0).position(-3.0, 0.0, 0.0));
+        world.insert(sheet(3.0, 0.0005).position(0.0, 0.0, 3.0));
+        world.insert(sheet(3.0, 0.0005).position(0.0, 0.0, -3.0));
         let angle = 0.1 * k as f32;
         let way = 900.0 * Vec3::new(angle.cos(), 0.0, angle.sin());
         let ball = Body::dynamic().shape(Shape::ball(0.1)).friction(0.0).restitution(1.0).velocity(way, Vec3::ZERO);
@@ -426,7 +426,7 @@ fn a_bounce_within_a_step_ends_before_the_next_wall() {
 fn what_is_held_gains_no_energy() {
     for k in 0..40 {
         let mut world = World::new();
-        world.add(Body::fixed().shape(Shape::cuboid(50.0, 0.0005, 50.0)));
+        world.insert(Body::fixed().shape(Shape::cuboid(50.0, 0.0005, 50.0)));
         let height = 20.0 + 0.07 * k as f32;
         let coin = Body::dynamic().shape(Shape::cylinder(0.001, 0.01)).rotation(Quat::from_rotation_x(0.4));
         let coin = world.insert(coin.position(0.0, height, 0.0).velocity(Vec3::ZERO, Vec3::new(20.0, 30.0, 10.0)));
@@ -464,7 +464,7 @@ fn deflection(world: &World, from: Vec3, velocity: Vec3, spin: Vec3, length: f32
 fn what_passes_without_touching_keeps_its_velocity() {
     let cube = || {
         let mut world = weightless();
-        world.add(Body::fixed().shape(Shape::cuboid(1.0, 1.0, 1.0)));
+        world.insert(Body::fixed().shape(Shape::cuboid(1.0, 1.0, 1.0)));
         world
     };
     for speed in [20.0, 40.0, 100.0, 400.0, 1000.0] {
@@ -578,7 +578,7 @@ fn a_marked_body_that_is_pushed_within_a_step_passes_through_nothing() {
         let mut world = weightless();
         let ball = |x: f32| Body::dynamic().shape(Shape::ball(0.02)).position(x, 0.0, 0.0);
         let x = -1.0 - 0.1 * k as f32 * speed * DT;
-        world.add(ball(x).velocity(Vec3::X * speed, Vec3::ZERO));
+        world.insert(ball(x).velocity(Vec3::X * speed, Vec3::ZERO));
         let mut middle = ball(0.0);
         middle.swept = is_swept;
         let second = world.insert(middle);
@@ -633,13 +633,13 @@ fn a_sensor_tells_when_something_flew_through_it() {
 #[test]
 fn a_world_of_fast_bodies_goes_on_from_its_saved_state_bit_by_bit() {
     let mut world = World::new();
-    world.add(Body::fixed().shape(room_of_triangles(3)));
+    world.insert(Body::fixed().shape(room_of_triangles(3)));
     let mut random = Random(SplitMix64::new(5));
     for k in 0..20 {
         let [x, y, z] = (4.0 * random.vector()).to_array();
         let body = Body::dynamic().shape(random.shape()).position(x, y, z).restitution(0.5);
         let body = body.velocity(random.direction() * random.scale(10.0, 300.0), 20.0 * random.vector());
-        world.add(if k % 3 == 0 { body.swept() } else { body });
+        world.insert(if k % 3 == 0 { body.swept() } else { body });
     }
     let mut simulation = simulation(world);
     for _ in 0..30 {

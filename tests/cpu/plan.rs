@@ -19,9 +19,9 @@ fn planned(world: World, config: SolverConfig) -> (StepPlan, u64, Simulation) {
 fn row(shape: &Shape, friction: f32, restitution: f32) -> World {
     let mut world = World::new();
     let surface = |body: Body| body.friction(friction).restitution(restitution);
-    world.add(surface(Body::fixed().shape(Shape::half_space(Vec3::Y))));
+    world.insert(surface(Body::fixed().shape(Shape::half_space(Vec3::Y))));
     for k in 0..8 {
-        world.add(surface(Body::dynamic().shape(shape.clone()).position(2.0 * k as f32, 0.5, 0.0)));
+        world.insert(surface(Body::dynamic().shape(shape.clone()).position(2.0 * k as f32, 0.5, 0.0)));
     }
     world
 }
@@ -164,7 +164,7 @@ fn a_pile_needs_no_more_colors_than_there_are() {
 fn joints_are_swept_before_contacts_and_solved_after_them() {
     use drystone::config::JointSolver;
     let mut world = row(&cube(), 0.5, 0.0);
-    world.join(drystone::Joint::new(1, Vec3::X, 2, -Vec3::X));
+    world.insert_joint(drystone::Joint::new(1, Vec3::X, 2, -Vec3::X));
     let config = SolverConfig::default().with(|c| {
         c.substeps = 1;
         c.iterations = 2;
@@ -315,10 +315,10 @@ fn bodies_with_equal_moments_of_inertia_need_no_tensor_and_move_the_same() {
 /// across their arms.
 fn one_lies_and_one_hangs() -> World {
     let mut world = row(&cube(), 0.5, 0.0);
-    let hung = world.add(Body::dynamic().shape(cube()).position(0.0, 20.0, 0.0));
-    let load = world.add(Body::dynamic().shape(Shape::ball(0.1)).total_mass(1e8).position(0.0, 17.0, 0.0));
-    world.join(Joint::to_world(hung, Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.0, 20.5, 0.0)));
-    world.join(Joint::new(hung, Vec3::new(0.0, -0.5, 0.0), load, Vec3::new(0.0, 2.5, 0.0)));
+    let hung = world.insert(Body::dynamic().shape(cube()).position(0.0, 20.0, 0.0));
+    let load = world.insert(Body::dynamic().shape(Shape::ball(0.1)).total_mass(1e8).position(0.0, 17.0, 0.0));
+    world.insert_joint(Joint::to_world(hung, Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.0, 20.5, 0.0)));
+    world.insert_joint(Joint::new(hung, Vec3::new(0.0, -0.5, 0.0), load, Vec3::new(0.0, 2.5, 0.0)));
     world
 }
 

@@ -54,10 +54,10 @@ fn scenery(world: &mut World) {
     let vertices = vec![Vec3::ZERO, Vec3::new(0.0, 0.3, 4.0), Vec3::new(4.0, 0.0, 0.0), Vec3::new(4.0, 1.0, 4.0)];
     let mesh = Shape::mesh(vertices, vec![[0, 1, 2], [2, 1, 3]]).expect("a mesh");
     let field = Shape::height_field(&rows, Vec3::new(8.0, 0.5, 8.0)).expect("a field");
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).position(0.0, -0.5, 0.0));
-    world.add(Body::fixed().shape(field).position(-4.0, 0.5, -4.0));
-    world.add(Body::fixed().shape(mesh).position(1.0, 1.0, 1.0).rotation(tilted));
-    world.add(Body::kinematic().shape(Shape::cuboid(0.2, 3.0, 6.0)).position(6.0, 3.0, 0.0));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).position(0.0, -0.5, 0.0));
+    world.insert(Body::fixed().shape(field).position(-4.0, 0.5, -4.0));
+    world.insert(Body::fixed().shape(mesh).position(1.0, 1.0, 1.0).rotation(tilted));
+    world.insert(Body::kinematic().shape(Shape::cuboid(0.2, 3.0, 6.0)).position(6.0, 3.0, 0.0));
 }
 
 fn each_collider<'a>(world: &'a World, filter: &Filter<'a>) -> Vec<(Found, &'a Shape, Pose)> {
@@ -184,7 +184,7 @@ fn answers_are_those_of_all_colliders_one_by_one_in_worlds_that_change() {
         for world in &mut worlds {
             scenery(world);
             for _ in 0..120 {
-                world.add(body(&mut random));
+                world.insert(body(&mut random));
             }
         }
         let [mut world, other] = worlds;
@@ -374,7 +374,7 @@ fn a_shape_finds_what_it_overlaps() {
     let mut world = World::new();
     scenery(&mut world);
     for _ in 0..200 {
-        world.add(body(&mut random));
+        world.insert(body(&mut random));
     }
     let queries = Queries::of(&world);
     let mut counts = [0; 2];
@@ -495,7 +495,7 @@ fn answers_are_the_same_for_any_number_of_threads_and_any_tree() {
             let mut world = World::new();
             scenery(&mut world);
             for _ in 0..300 {
-                world.add(body(&mut random));
+                world.insert(body(&mut random));
             }
             let mut simulation = simulation(world);
             for _ in 0..30 {
@@ -526,7 +526,7 @@ fn what_is_no_number_and_what_is_not_there_meets_nothing() {
     let mut world = World::new();
     scenery(&mut world);
     for _ in 0..50 {
-        world.add(body(&mut random));
+        world.insert(body(&mut random));
     }
     let turn = Quat::IDENTITY;
     let nothing = World::new();
@@ -609,7 +609,7 @@ fn shapes_of_all_sizes_give_numbers() {
         for shape in &shapes {
             for _ in 0..3 {
                 let place = random.vector((3.0 * size).min(MAX_LENGTH));
-                world.add(
+                world.insert(
                     Body::fixed().shape(shape.clone()).position(place.x, place.y, place.z).rotation(random.rotation()),
                 );
             }

@@ -21,9 +21,9 @@ fn ground() -> Body {
 
 fn towers() -> World {
     let mut world = World::new();
-    world.add(ground());
+    world.insert(ground());
     for i in 0..15 {
-        world.add(cube(3.0 * (i / 5) as f32, 0.5 + (i % 5) as f32));
+        world.insert(cube(3.0 * (i / 5) as f32, 0.5 + (i % 5) as f32));
     }
     world
 }
@@ -43,7 +43,7 @@ fn recorded() -> (Vec<u8>, Simulation) {
             15 => world.bodies[7].linear_velocity = Vec3::new(2.0, 1.0, 0.0),
             20 => world.bodies[8].kind = BodyKind::Fixed,
             25 => world.gravity = Vec3::new(1.0, -8.0, 0.0),
-            30 => drop(world.join(Joint::new(11, 0.5 * Vec3::Y, 12, -0.5 * Vec3::Y))),
+            30 => drop(world.insert_joint(Joint::new(11, 0.5 * Vec3::Y, 12, -0.5 * Vec3::Y))),
             35 => world.bodies[12].groups = Groups { membership: 2, filter: 3 },
             40 => world.bodies[13].colliders[0].shape = Shape::ball(0.5),
             45 => world.bodies[14].force = Vec3::new(0.0, 5e3, 0.0),

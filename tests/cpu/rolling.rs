@@ -1,6 +1,6 @@
 //! A ball and a block on a board that turns, against what paper says.
 
-use drystone::{Body, Cpu, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Cpu, Shape, Simulation, SolverConfig, World};
 use glam::{Quat, Vec3};
 
 /// A wide board that turns about the z axis through the middle of its upper side, at `rate` [rad/s], down to the right.
@@ -8,13 +8,13 @@ fn turning_board(rate: f32) -> World {
     let mut world = World::new();
     let mut board = Body::kinematic().shape_at(Shape::cuboid(2.0, 1.0, 2.0), Vec3::NEG_Y, Quat::IDENTITY);
     board.angular_velocity = Vec3::new(0.0, 0.0, -rate);
-    world.add(board);
+    world.insert(board);
     world
 }
 
 /// Where a body of `simulation` is along its board [m].
-fn along_board(simulation: &Simulation, body: usize) -> f32 {
-    let [board, body] = [0, body].map(|i| &simulation.world.bodies[i]);
+fn along_board(simulation: &Simulation, body: BodyHandle) -> f32 {
+    let [board, body] = [0.into(), body].map(|i| &simulation.world.bodies[i]);
     (board.rotation.inverse() * body.position).x
 }
 
@@ -23,7 +23,7 @@ fn along_board(simulation: &Simulation, body: usize) -> f32 {
 fn a_ball_rolls_on_a_board_that_tilts_as_on_paper() {
     let (rate, radius, g) = (20.0_f32.to_radians(), 0.015, 9.81);
     let mut world = turning_board(rate);
-    let ball = world.add(Body::dynamic().density(7800.0).shape(Shape::ball(radius)).position(0.0, radius, 0.0));
+    let ball = world.insert(Body::dynamic().density(7800.0).shape(Shape::ball(radius)).position(0.0, radius, 0.0));
     let mut simulation =
         Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let (mut paper, mut v, h) = (0.0, -f64::from(rate * radius), 1e-5);
@@ -46,7 +46,7 @@ fn a_ball_rolls_on_a_board_that_tilts_as_on_paper() {
 fn a_block_on_a_board_that_tilts_slowly_slips_at_the_angle_of_friction() {
     let (rate, dt) = (4.0_f32.to_radians(), 1.0 / 60.0);
     let mut world = turning_board(rate);
-    let block = world.add(Body::dynamic().shape(Shape::cuboid(0.2, 0.05, 0.2)).position(0.0, 0.05, 0.0));
+    let block = world.insert(Body::dynamic().shape(Shape::cuboid(0.2, 0.05, 0.2)).position(0.0, 0.05, 0.0));
     let mut simulation =
         Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a simulation");
     let mut angle = 0.0;

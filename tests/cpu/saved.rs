@@ -179,12 +179,12 @@ fn all_shapes() -> World {
     let mut world = World::new();
     let hill = |i: usize, j: usize| 0.05 * ((i * 7 + j * 3) % 5) as f32;
     let heights: Vec<Vec<f32>> = (0..9).map(|i| (0..7).map(|j| hill(i, j)).collect()).collect();
-    world.add(Body::fixed().shape(Shape::height_field(&heights, Vec3::new(8.0, 1.0, 8.0)).expect("hills")));
+    world.insert(Body::fixed().shape(Shape::height_field(&heights, Vec3::new(8.0, 1.0, 8.0)).expect("hills")));
     let corners = [[-4.0, 0.0, -4.0], [4.0, 0.0, -4.0], [4.0, 0.5, 4.0], [-4.0, 0.2, 4.0], [-4.0, 0.0, -4.0]];
     let triangles = vec![[0, 2, 1], [4, 3, 2]];
     let mesh = Shape::mesh(corners.map(Vec3::from_array).to_vec(), triangles).expect("a mesh");
-    world.add(Body::fixed().shape(mesh).position(20.0, 0.0, 0.0));
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::new(0.6, 0.8, 0.0))).position(-40.0, -20.0, 0.0));
+    world.insert(Body::fixed().shape(mesh).position(20.0, 0.0, 0.0));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::new(0.6, 0.8, 0.0))).position(-40.0, -20.0, 0.0));
     let points: Vec<Vec3> = (0..14).map(|i| (0.4 + 0.01 * (i % 3) as f32) * point_on_ball(i)).collect();
     let hull = Shape::convex_hull(&points).expect("a hull");
     let shapes = [
@@ -200,10 +200,10 @@ fn all_shapes() -> World {
         let side = if i % 2 == 0 { 0.0 } else { 20.0 };
         let turn = Quat::from_euler(drystone::glam::EulerRot::XYZ, 0.3 * i as f32, 0.7, 0.1 * i as f32);
         let body = Body::dynamic().shape(shape.clone()).rotation(turn).named(format!("body {i}"));
-        world.add(body.position(at.x + side, at.y, at.z));
+        world.insert(body.position(at.x + side, at.y, at.z));
     }
     let bar = Body::dynamic().shape(shapes[2].clone()).shape_at(shapes[1].clone(), Vec3::X, Quat::IDENTITY);
-    world.add(bar.position(0.0, 4.0, 0.0));
+    world.insert(bar.position(0.0, 4.0, 0.0));
     world
 }
 
@@ -249,7 +249,7 @@ fn come_and_go(step: u32, world: &mut World) {
         30 => dynamic_mut(world, 2).colliders[0].shape = Shape::ball(0.45),
         40 => {
             let (a, b) = (world.insert(cube(4.0)), world.insert(cube(5.5)));
-            world.join(Joint::new(a, 0.75 * Vec3::X, b, -0.75 * Vec3::X));
+            world.insert_joint(Joint::new(a, 0.75 * Vec3::X, b, -0.75 * Vec3::X));
         }
         50 => drop(world.remove(world.joints[0].body_a)),
         55 => dynamic_mut(world, 3).material.friction = 0.9,
@@ -320,9 +320,9 @@ fn handles_name_the_same_bodies_and_joints_after_loading() {
 
 fn small() -> Vec<u8> {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for i in 0..2 {
-        world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
+        world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
     }
     let mut simulation = Simulation::with(world, SolverConfig::default(), cpu()).expect("a good world");
     (0..5).for_each(|_| drop(simulation.step(DT).expect("a step")));
@@ -358,10 +358,10 @@ fn bytes_that_are_damaged_or_cut_short_are_refused_in_one_line() {
 #[test]
 fn a_hash_is_what_its_definition_says() {
     let mut world = World::new();
-    world.add(Body::fixed());
+    world.insert(Body::fixed());
     let gone = world.insert(Body::fixed());
     world.remove(gone);
-    world.add(Body::dynamic().shape(Shape::ball(0.5)).position(1.0, -0.0, 3.0).velocity(Vec3::X, Vec3::Y));
+    world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(1.0, -0.0, 3.0).velocity(Vec3::X, Vec3::Y));
     assert_eq!(world.bodies.len(), 2);
     let simulation = Simulation::with(world, SolverConfig::default(), cpu()).expect("a good world");
     let numbers = |index: u32, generation: u32, floats: [f32; 13]| {

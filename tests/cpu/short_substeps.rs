@@ -16,8 +16,8 @@ fn simulation(world: World, substeps: u32) -> Simulation {
 fn only_a_plan_of_short_substeps_begins_and_ends_changes() {
     let plan = |substeps| {
         let mut world = World::new();
-        world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-        world.add(cube().position(0.0, 0.5, 0.0));
+        world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+        world.insert(cube().position(0.0, 0.5, 0.0));
         simulation(world, substeps).next_problem(1.0 / 60.0).expect("a step").1.to_string()
     };
     assert!(!plan(16).contains("change") && !plan(16).contains("from start"), "{}", plan(16));
@@ -34,15 +34,15 @@ fn a_moving_floor_carries_a_tower_of_short_substeps() {
     let mut world = World::new();
     let mut floor = Body::kinematic().shape(Shape::cuboid(50.0, 0.5, 50.0)).position(0.0, -0.5, 0.0);
     floor.linear_velocity = speed;
-    world.add(floor);
-    let lowest = world.add(cube().position(0.0, 0.5, 0.0));
-    let highest = world.add(cube().position(0.0, 1.5, 0.0));
+    world.insert(floor);
+    let lowest = world.insert(cube().position(0.0, 0.5, 0.0));
+    let highest = world.insert(cube().position(0.0, 1.5, 0.0));
     let mut simulation = simulation(world, 32);
     for _ in 0..120 {
         simulation.step(1.0 / 60.0).expect("a step");
     }
     for body in [lowest, highest] {
         let v = simulation.world.bodies[body].linear_velocity;
-        assert!((v - speed).length() < 1e-3, "body {body}: {v} m/s");
+        assert!((v - speed).length() < 1e-3, "{body:?}: {v} m/s");
     }
 }

@@ -42,10 +42,10 @@ fn floor() -> Body {
 /// A floor and two stacks of three, 10 m apart; bodies 1 to 3 and 4 to 6.
 fn stacks() -> World {
     let mut world = World::new();
-    world.add(floor());
+    world.insert(floor());
     for x in [0.0, 10.0] {
         for k in 0..3 {
-            world.add(cube(x, 0.5 + k as f32));
+            world.insert(cube(x, 0.5 + k as f32));
         }
     }
     world
@@ -84,13 +84,13 @@ fn a_body_that_may_not_sleep_keeps_its_island_awake() {
 #[test]
 fn what_still_comes_out_of_another_body_stays_awake() {
     let mut world = World::new();
-    world.add(floor());
-    world.add(cube(0.0, 0.484));
+    world.insert(floor());
+    world.insert(cube(0.0, 0.484));
     // Walls hold this one for ever. It sleeps all the same.
     for x in [9.02, 11.0 - 0.02] {
-        world.add(Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0));
+        world.insert(Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0));
     }
-    world.add(cube(10.0, 0.5));
+    world.insert(cube(10.0, 0.5));
     let mut simulation = simulation(world, sleepy().with(|c| c.push_limit = 5e-3));
     run(&mut simulation, 90);
     let height = simulation.world.bodies[1].position.y;
@@ -144,7 +144,7 @@ fn where_nothing_sleeps_sleeping_changes_no_bit() {
 #[test]
 fn a_thrown_box_wakes_the_stack_that_it_hits_and_no_other() {
     let mut world = stacks();
-    let thrown = world.add(cube(30.0, 50.0));
+    let thrown = world.insert(cube(30.0, 50.0));
     let mut simulation = simulation(world, sleepy());
     // On its way for 3 s: the stacks sleep by then, and the box does not, though it touches nothing.
     run(&mut simulation, 170);
@@ -182,8 +182,8 @@ fn whatever_is_changed_from_outside_wakes_its_island() {
 /// A cube on a kinematic plate.
 fn on_a_plate() -> Simulation {
     let mut world = World::new();
-    world.add(Body::kinematic().shape(Shape::cuboid(2.0, 0.5, 2.0)).position(0.0, -0.5, 0.0));
-    world.add(cube(0.0, 0.5));
+    world.insert(Body::kinematic().shape(Shape::cuboid(2.0, 0.5, 2.0)).position(0.0, -0.5, 0.0));
+    world.insert(cube(0.0, 0.5));
     let mut simulation = simulation(world, sleepy());
     run(&mut simulation, 300);
     assert!(simulation.is_asleep(1));
@@ -215,16 +215,16 @@ fn what_lay_on_a_body_that_is_taken_away_falls() {
 fn a_chain_sleeps_and_wakes_as_a_whole() {
     let mut world = World::new();
     let link = |y: f32| Body::dynamic().shape(Shape::ball(0.2)).position(0.0, y, 0.0);
-    let first = world.add(link(-0.5));
-    world.join(Joint::to_world(first, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    let first = world.insert(link(-0.5));
+    world.insert_joint(Joint::to_world(first, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
     let mut last = first;
     for k in 1..4 {
-        let next = world.add(link(-0.5 - k as f32));
-        world.join(Joint::new(last, Vec3::new(0.0, -0.5, 0.0), next, Vec3::new(0.0, 0.5, 0.0)));
+        let next = world.insert(link(-0.5 - k as f32));
+        world.insert_joint(Joint::new(last, Vec3::new(0.0, -0.5, 0.0), next, Vec3::new(0.0, 0.5, 0.0)));
         last = next;
     }
     // Beside it a body that stays awake, so that steps go on.
-    let awake = world.add(cube(100.0, 0.0));
+    let awake = world.insert(cube(100.0, 0.0));
     let mut simulation = simulation(world, sleepy());
     run(&mut simulation, 120);
     assert!(asleep(&simulation, 0..4) && !simulation.is_asleep(awake));
@@ -245,7 +245,7 @@ fn a_pile_that_sleeps_and_is_hit_gives_the_same_bits_for_any_number_of_threads()
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
             let mut world = Scene::find("pile", &["n=100".into()]).expect("the scene").world;
-            let thrown = world.add(cube(0.0, 300.0));
+            let thrown = world.insert(cube(0.0, 300.0));
             let mut simulation = simulation(world, sleepy());
             let sleeping = run(&mut simulation, 360).asleep;
             assert!(sleeping >= 90, "{sleeping} sleep");
@@ -279,8 +279,8 @@ fn every_domino_of_a_row_still_falls() {
 fn drifting(velocity: Vec3, spin: f32, config: SolverConfig) -> Simulation {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    world.add(floor().friction(0.0));
-    world.add(cube(0.0, 0.5).friction(0.0).velocity(velocity, Vec3::Y * spin));
+    world.insert(floor().friction(0.0));
+    world.insert(cube(0.0, 0.5).friction(0.0).velocity(velocity, Vec3::Y * spin));
     simulation(world, config)
 }
 
@@ -324,9 +324,9 @@ fn what_falls_asleep_stands_still() {
 fn what_touches_nothing_never_sleeps() {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    let alone = world.add(cube(0.0, 50.0));
-    world.add(floor());
-    let held = world.add(cube(0.0, 0.5));
+    let alone = world.insert(cube(0.0, 50.0));
+    world.insert(floor());
+    let held = world.insert(cube(0.0, 0.5));
     let mut simulation = simulation(world, sleepy());
     assert_eq!(run(&mut simulation, 120).asleep, 1);
     assert!(!simulation.is_asleep(alone) && simulation.is_asleep(held));
@@ -374,11 +374,11 @@ fn a_shape_on_a_long_arm_counts_with_its_arm() {
     for (share, asleep) in [(0.9, 1), (1.1, 0)] {
         let mut world = World::new();
         world.gravity = Vec3::ZERO;
-        world.add(floor().friction(0.0));
+        world.insert(floor().friction(0.0));
         let ball = Shape::ball(0.5);
         let arms = Body::dynamic().shape_at(ball.clone(), Vec3::X * 2.0, Quat::IDENTITY);
         let arms = arms.shape_at(ball, Vec3::X * -2.0, Quat::IDENTITY).friction(0.0).position(0.0, 0.5, 0.0);
-        world.add(arms.velocity(Vec3::ZERO, Vec3::Y * share * limit / 2.5));
+        world.insert(arms.velocity(Vec3::ZERO, Vec3::Y * share * limit / 2.5));
         assert_eq!(run(&mut simulation(world, sleepy()), 64).asleep, asleep, "{share} of the limit");
     }
 }
@@ -388,9 +388,9 @@ fn a_shape_on_a_long_arm_counts_with_its_arm() {
 fn what_touches_what_moves_does_not_sleep() {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    world.add(floor().friction(0.0));
-    world.add(cube(0.0, 0.5).friction(0.0));
-    world.add(cube(1.0, 0.5).friction(0.0).velocity(Vec3::Z * 0.1, Vec3::ZERO));
+    world.insert(floor().friction(0.0));
+    world.insert(cube(0.0, 0.5).friction(0.0));
+    world.insert(cube(1.0, 0.5).friction(0.0).velocity(Vec3::Z * 0.1, Vec3::ZERO));
     let mut simulation = simulation(world, sleepy());
     for step in 0..120 {
         assert_eq!(run(&mut simulation, 1).asleep, 0, "step {step}");
@@ -429,11 +429,11 @@ fn what_is_tied_to_a_body_that_moves_wakes() {
         for (change, hand, changed) in &changes {
             for swap in [false, true] {
                 let mut world = World::new();
-                let hand = world.add(hand.clone().shape(Shape::ball(0.2)));
-                let load = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, -2.0, 0.0));
+                let hand = world.insert(hand.clone().shape(Shape::ball(0.2)));
+                let load = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, -2.0, 0.0));
                 let joint = tied(Joint::new(load, Vec3::Y * 2.0, hand, Vec3::ZERO));
                 let Joint { body_a, anchor_a, anchor_b, .. } = joint;
-                world.join(match swap {
+                world.insert_joint(match swap {
                     true => Joint {
                         body_a: hand.into(),
                         body_b: Some(body_a),
@@ -461,8 +461,8 @@ fn what_is_tied_to_a_body_that_moves_wakes() {
 #[test]
 fn what_a_joint_of_free_axes_ties_never_sleeps() {
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-    let [a, b] = [0.0, 0.5].map(|x| world.add(Body::dynamic().shape(Shape::ball(0.5)).position(x, 0.0, 0.0)));
-    world.join(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).generic([Axis::FREE; 3], [Axis::FREE; 3]));
+    let [a, b] = [0.0, 0.5].map(|x| world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(x, 0.0, 0.0)));
+    world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).generic([Axis::FREE; 3], [Axis::FREE; 3]));
     let mut simulation = simulation(world, sleepy());
     run(&mut simulation, 120);
     assert!(!asleep(&simulation, 0..2));

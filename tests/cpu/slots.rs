@@ -2,7 +2,7 @@
 
 use drystone::config::FrictionAt;
 use drystone::glam::Vec3;
-use drystone::{Body, Cpu, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Cpu, Shape, Simulation, SolverConfig, World};
 use drystone_scenes::Scene;
 
 const DT: f32 = 1.0 / 60.0;
@@ -24,19 +24,19 @@ fn ball(x: f32, y: f32) -> Body {
 /// Eight balls on the ground, 2 m apart.
 fn row_of_balls() -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for i in 0..8 {
-        world.add(ball(2.0 * i as f32, 0.5));
+        world.insert(ball(2.0 * i as f32, 0.5));
     }
     world
 }
 
 /// Rows of the contacts of a body.
-fn rows(simulation: &mut Simulation, body: u32) -> Vec<u32> {
+fn rows(simulation: &mut Simulation, body: BodyHandle) -> Vec<u32> {
     let (problem, _) = simulation.next_problem(DT).expect("a step");
     let own = |&row: &u32| {
         let contact = &problem.contacts[row as usize];
-        contact.body_a == body || contact.body_b == body
+        [contact.body_a, contact.body_b].contains(&(body.index() as u32))
     };
     problem.rows_of(&problem.contact_colors()).iter().copied().filter(own).collect()
 }
@@ -45,11 +45,11 @@ fn rows(simulation: &mut Simulation, body: u32) -> Vec<u32> {
 fn a_contact_stays_in_its_row_while_others_come_and_go() {
     let mut simulation = simulation(row_of_balls());
     run(&mut simulation, 10);
-    let before = rows(&mut simulation, 8);
+    let before = rows(&mut simulation, 8.into());
     for body in 1..4 {
         simulation.world.bodies[body].position.y = 50.0;
         run(&mut simulation, 5);
-        assert_eq!(rows(&mut simulation, 8), before, "without body {body}");
+        assert_eq!(rows(&mut simulation, 8.into()), before, "without body {body}");
     }
     assert_eq!(simulation.problem().swept_contacts().count(), 5);
 }
@@ -87,10 +87,10 @@ fn a_manifold_in_the_slot_of_one_that_ended_begins_without_its_impulses_and_prel
 
 fn begins_without_impulses(friction_at: FrictionAt) {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let (first, second) = (world.add(ball(0.0, 0.5)), world.add(ball(50.0, 800.0)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let (first, second) = (world.insert(ball(0.0, 0.5)), world.insert(ball(50.0, 800.0)));
     for i in 0..4 {
-        world.add(ball(10.0 + 2.0 * i as f32, 0.5));
+        world.insert(ball(10.0 + 2.0 * i as f32, 0.5));
     }
     let config = SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at);
     let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world");
@@ -98,7 +98,7 @@ fn begins_without_impulses(friction_at: FrictionAt) {
     // It slides, so that friction acts.
     simulation.world.bodies[first].linear_velocity = Vec3::Z * 5.0;
     run(&mut simulation, 3);
-    let row = rows(&mut simulation, first as u32)[0];
+    let row = rows(&mut simulation, first)[0];
     let borne = simulation.problem().contacts[row as usize];
     let last = (borne.first_point + simulation.problem().params.patches) as usize;
     let impulses = &simulation.problem().impulses;
@@ -106,11 +106,11 @@ fn begins_without_impulses(friction_at: FrictionAt) {
     assert!(impulses[last].tangent_1.abs() + impulses[last].tangent_2.abs() > 1.0);
     simulation.world.bodies[first].position.y = 40.0;
     run(&mut simulation, 1);
-    assert!(rows(&mut simulation, first as u32).is_empty());
+    assert!(rows(&mut simulation, first).is_empty());
     simulation.world.bodies[second].position.y = 0.5;
     // A body that lay still would begin with what it rests with.
     simulation.world.bodies[second].linear_velocity = 1e-3 * Vec3::NEG_Y;
-    assert_eq!(rows(&mut simulation, second as u32), [row]);
+    assert_eq!(rows(&mut simulation, second), [row]);
     let (problem, _) = simulation.next_problem(DT).expect("a step");
     let begun = problem.contacts[row as usize];
     let first_point = begun.first_point as usize;
@@ -125,12 +125,12 @@ fn slots_of_manifolds_that_ended_are_used_again() {
     let mut world = World::new();
     let vertices = (0..=60).flat_map(|i| [-2.0, 2.0].map(|z| Vec3::new(i as f32 * 0.25, 0.0, z))).collect();
     let triangles = (0..60).flat_map(|i| [[2 * i, 2 * i + 1, 2 * i + 2], [2 * i + 2, 2 * i + 1, 2 * i + 3]]).collect();
-    world.add(Body::fixed().shape(Shape::mesh(vertices, triangles).expect("a mesh")));
-    world.add(ball(1.0, 0.5).velocity(Vec3::X * 5.0, Vec3::NEG_Z * 10.0));
+    world.insert(Body::fixed().shape(Shape::mesh(vertices, triangles).expect("a mesh")));
+    world.insert(ball(1.0, 0.5).velocity(Vec3::X * 5.0, Vec3::NEG_Z * 10.0));
     // Contacts that last, so that slots are not sorted all the time.
     for i in 0..10 {
-        world.add(Body::fixed().shape(Shape::cuboid(0.6, 0.1, 0.6)).position(2.0 * i as f32, -3.0, 8.0));
-        world.add(ball(2.0 * i as f32, -2.4).position(2.0 * i as f32, -2.4, 8.0));
+        world.insert(Body::fixed().shape(Shape::cuboid(0.6, 0.1, 0.6)).position(2.0 * i as f32, -3.0, 8.0));
+        world.insert(ball(2.0 * i as f32, -2.4).position(2.0 * i as f32, -2.4, 8.0));
     }
     let mut simulation = simulation(world);
     run(&mut simulation, 120);

@@ -197,10 +197,10 @@ fn reordered() -> Symmetry {
     let forth = |case: &Case| {
         let mut world = World { gravity: case.world.gravity, ..World::new() };
         let count = case.world.bodies.len();
-        case.world.bodies.iter().rev().for_each(|body| _ = world.add(body.clone()));
+        case.world.bodies.iter().rev().for_each(|body| _ = world.insert(body.clone()));
         for joint in case.world.joints.iter() {
             let place = |body: BodyHandle| BodyHandle::from(count - 1 - body.index());
-            world.join(Joint { body_a: place(joint.body_a), body_b: joint.body_b.map(place), ..*joint });
+            world.insert_joint(Joint { body_a: place(joint.body_a), body_b: joint.body_b.map(place), ..*joint });
         }
         Case { world, ..case.clone() }
     };
@@ -220,7 +220,7 @@ fn apart(case: &Case, symmetry: &Symmetry, steps: usize) -> Vec<f32> {
 /// Bodies of all convex shapes but hulls that fall onto a plane.
 fn fall() -> Case {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     let shapes = [
         Shape::ball(0.5),
         Shape::cuboid(0.5, 0.25, 0.375),
@@ -231,7 +231,7 @@ fn fall() -> Case {
     for (k, shape) in shapes.into_iter().enumerate() {
         let turn = Quat::from_euler(EulerRot::XYZ, 0.3, 0.2, 0.5 * k as f32);
         let body = Body::dynamic().shape(shape).position(2.0 * k as f32 - 4.0, 1.0, 0.25 * k as f32).rotation(turn);
-        world.add(body.velocity(Vec3::new(0.5, 0.0, 0.25), Vec3::new(0.0, 1.0, 0.5)));
+        world.insert(body.velocity(Vec3::new(0.5, 0.0, 0.25), Vec3::new(0.0, 1.0, 0.5)));
     }
     Case::of(world)
 }
@@ -445,8 +445,8 @@ fn wrong_images_are_found() {
     }
     // A bit of a bit: the limit of the speed at which overlap is pushed out has a unit.
     let mut deep = Case::of(World::new());
-    deep.world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    deep.world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.25, 0.0));
+    deep.world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    deep.world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.25, 0.0));
     assert_apart("a box that is pushed out", &deep, &scaled(4.0), 10, 0.0);
     assert!(
         least(&deep, &wrong(scaled(4.0), |image| image.config.push_limit = SolverConfig::default().push_limit), 10)

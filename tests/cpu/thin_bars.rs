@@ -29,7 +29,7 @@ fn bar(shape: &Shape, at: Vec3, turn: f32) -> Body {
 
 fn floor() -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     world
 }
 
@@ -50,7 +50,7 @@ fn assert_pile_stands(name: &str, shape: Bar, thick: f32) {
     for layer in 0..6 {
         for side in [-1.5, 1.5] {
             let (aside, turn) = if layer % 2 == 0 { (Vec3::Z, 0.0) } else { (Vec3::X, FRAC_PI_2) };
-            world.add(bar(&shape, thick * (side * aside + (layer as f32 + 0.5) * Vec3::Y), turn));
+            world.insert(bar(&shape, thick * (side * aside + (layer as f32 + 0.5) * Vec3::Y), turn));
         }
     }
     let before: Vec<Vec3> = world.bodies.iter().map(|body| body.position).collect();
@@ -75,8 +75,8 @@ fn a_thin_bar_that_falls_on_another_stays_on_it() {
     for shape in [cuboid as Bar, hull] {
         for turn in [FRAC_PI_2, 1.0, 0.3, 0.05] {
             let (mut world, shape) = (floor(), shape(THICK));
-            world.add(bar(&shape, Vec3::Y * 0.5 * THICK, 0.0));
-            world.add(bar(&shape, Vec3::Y * 2.0 * THICK, turn));
+            world.insert(bar(&shape, Vec3::Y * 0.5 * THICK, 0.0));
+            world.insert(bar(&shape, Vec3::Y * 2.0 * THICK, turn));
             let height = after(world, 1.0)[2].y / THICK;
             println!("{turn}: {height}");
             assert!((height - 1.5).abs() < 0.05, "turned by {turn}, a bar lies at {height} times its thickness");

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 /// The modules of the engine on each floor, the ground floor first.
 const LIBRARY: &[&[&str]] = &[
-    &["constants", "math", "lanes", "random", "error", "memory", "names", "panics", "saved", "stats", "suggest"],
-    &["world", "config", "preset"],
+    &["constants", "math", "lanes", "random", "error", "memory", "names", "panics", "saved", "suggest"],
+    &["world", "config", "preset", "stats"],
     &["collide", "graph"],
     &["effort", "queries", "load"],
     &["problem"],

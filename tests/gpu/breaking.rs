@@ -7,7 +7,9 @@ use crate::common::{Open, gpu};
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::plan::Kernel;
-use drystone::{Axis, Backend, Body, Cpu, Event, Joint, JointHandle, Shape, Simulation, SolverConfig, World};
+use drystone::{
+    Axis, Backend, Body, BodyHandle, Cpu, Event, Joint, JointHandle, Shape, Simulation, SolverConfig, World,
+};
 
 tests! {
     exact_gpu {
@@ -57,7 +59,7 @@ fn broken(simulation: &mut Simulation) -> Vec<(JointHandle, f32)> {
 }
 
 /// Joints of every kind that hold a cube up whose top is under `top`.
-fn hangers(cube: usize, top: Vec3) -> [Joint; 11] {
+fn hangers(cube: BodyHandle, top: Vec3) -> [Joint; 11] {
     let at = |above: f32| Joint::to_world(cube, 0.5 * Vec3::Y, top + above * Vec3::Y);
     let upright = [Axis::FREE, Axis::LOCKED, Axis::FREE];
     [
@@ -83,11 +85,11 @@ fn a_weight_breaks_a_joint_of_any_kind_that_bears_less() {
         for open in EXACT {
             let mut world = World::new();
             let mut joints = Vec::new();
-            for kind in 0..hangers(0, Vec3::ZERO).len() {
+            for kind in 0..hangers(0.into(), Vec3::ZERO).len() {
                 let pair = [0.0, 3.0].map(|z| {
                     let top = Vec3::new(3.0 * kind as f32, 0.0, z);
                     let shape = Shape::cuboid(0.5, 0.5, 0.5);
-                    let cube = world.add(Body::dynamic().shape(shape).total_mass(2.0).position(top.x, -0.5, z));
+                    let cube = world.insert(Body::dynamic().shape(shape).total_mass(2.0).position(top.x, -0.5, z));
                     world.insert_joint(hangers(cube, top)[kind])
                 });
                 joints.push(pair);
@@ -123,14 +125,14 @@ fn shots(gap: impl Fn(usize) -> f32) -> World {
     for k in 0..20 {
         let at = Vec3::new(0.0, 0.0, 3.0 * k as f32);
         let plate = Body::dynamic().shape(Shape::cuboid(0.05, 0.5, 0.5)).total_mass(1000.0).position(0.0, 0.0, at.z);
-        let plate = world.add(plate.restitution(0.0));
+        let plate = world.insert(plate.restitution(0.0));
         let ball = Body::dynamic().shape(Shape::ball(0.1)).total_mass(1.0).position(-0.15 - gap(k), 0.0, at.z);
-        world.add(ball.restitution(0.0).velocity(10.0 * Vec3::X, Vec3::ZERO));
+        world.insert(ball.restitution(0.0).velocity(10.0 * Vec3::X, Vec3::ZERO));
         let joint = Joint::to_world(plate, Vec3::ZERO, at);
         let joint =
             [joint, joint.fixed(), joint.slider(Vec3::Y), Joint::to_world(plate, Vec3::ZERO, at + Vec3::X).rod(1.0)]
                 [k % 4];
-        world.join(joint.breaking_at((0.905 + 0.01 * k as f32) * 600.0));
+        world.insert_joint(joint.breaking_at((0.905 + 0.01 * k as f32) * 600.0));
     }
     world
 }
@@ -170,8 +172,8 @@ fn a_body_gets_the_summed_impulse_of_its_joint_in_every_step() {
     for substeps in [1, 2, 4, 8, 32] {
         let mut world = World::new();
         let cube =
-            world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(2.0).position(1.0, 0.0, 0.0));
-        world.join(Joint::to_world(cube, -Vec3::X, Vec3::ZERO).breaking_at(1e9));
+            world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(2.0).position(1.0, 0.0, 0.0));
+        world.insert_joint(Joint::to_world(cube, -Vec3::X, Vec3::ZERO).breaking_at(1e9));
         let mut simulation = simulation(&world, &of_substeps(substeps), reference);
         let mut most = 0.0_f32;
         for step in 0..120 {
@@ -209,10 +211,10 @@ fn a_joint_of_bodies_that_sleep_bears_nothing_and_breaks_once_it_may_bear_less()
     for open in EXACT {
         let mut world = World::new();
         let cube = |x: f32| Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(2.0).position(x, -0.5, 0.0);
-        let hung = world.add(cube(0.0));
+        let hung = world.insert(cube(0.0));
         let joint = world.insert_joint(Joint::to_world(hung, 0.5 * Vec3::Y, Vec3::ZERO).breaking_at(25.0));
         // Another one falls, so that steps go on.
-        world.add(cube(100.0).rotation(Quat::from_rotation_z(FRAC_PI_2)));
+        world.insert(cube(100.0).rotation(Quat::from_rotation_z(FRAC_PI_2)));
         let mut simulation = simulation(&world, &SolverConfig::default().with(|c| c.sleep_after = 0.5), open);
         for _ in 0..60 {
             assert_eq!(broken(&mut simulation), []);

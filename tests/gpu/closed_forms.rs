@@ -53,7 +53,7 @@ fn run(world: World, backend: Box<dyn Backend>, seconds: f64, rate: u32) -> Worl
 fn ground(slope: f64, friction: f32) -> World {
     let mut world = World::new();
     world.gravity = Vec3::new((G * slope.sin()) as f32, (-G * slope.cos()) as f32, 0.0);
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(friction));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(friction));
     world
 }
 
@@ -69,7 +69,7 @@ fn a_body_falls_as_the_substeps_of_the_integrator_say_to_the_last_bit(open: Open
     world.gravity = Vec3::new(0.0, -10.0, 0.0);
     let (start, v) = (Vec3::new(1.0, 20.0, -3.0), Vec3::new(2.0, 5.0, -0.5));
     let ball = Body::dynamic().shape(Shape::ball(0.5)).position(start.x, start.y, start.z);
-    world.add(ball.velocity(v, Vec3::ZERO));
+    world.insert(ball.velocity(v, Vec3::ZERO));
     let fallen = &run(world, backend, 1.0, 64).bodies[0];
     let (n, h) = (256.0, 1.0 / 256.0);
     // v gains g h in each of n substeps, each of which then moves by v h.
@@ -84,7 +84,7 @@ fn a_free_ball_turns_by_its_angular_velocity(open: Open) {
     let name = backend.name();
     let mut world = World::new();
     let spin = Vec3::new(1.0, -2.0, 0.5);
-    world.add(Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::ZERO, spin));
+    world.insert(Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::ZERO, spin));
     let turned = run(world, backend, 1.0, 60).bodies[0].rotation;
     // Not from the cosine of the angle, in which rounding hides 1e-4 rad.
     let error = (turned * Quat::from_scaled_axis(spin).conjugate()).xyz().length() * 2.0;
@@ -96,7 +96,7 @@ fn sag_of_two_cubes(backend: Box<dyn Backend>, frequency: f32, preload_rate: f32
     let mut world = ground(0.0, 0.5);
     for y in [0.5, 1.5] {
         // A body that moves begins without impulses and preloads.
-        world.add(cube().position(0.0, y, 0.0).velocity(1e-3 * Vec3::NEG_Y, Vec3::ZERO));
+        world.insert(cube().position(0.0, y, 0.0).velocity(1e-3 * Vec3::NEG_Y, Vec3::ZERO));
     }
     let soft = SolverConfig::default().without_sleep().with(|c| {
         c.substeps = 2;
@@ -149,7 +149,7 @@ fn what_a_load_leaves_behind_stays_where_it_is(open: Open) {
     let name = backend.name();
     let mut world = ground(0.0, 0.5);
     for (y, density) in [(0.5, 1e3), (1.5, 1e3), (2.5, 1e5)] {
-        world.add(cube().density(density).position(0.0, y, 0.0));
+        world.insert(cube().density(density).position(0.0, y, 0.0));
     }
     let mut simulation = simulation(world, SolverConfig::default().without_sleep().with(|c| c.substeps = 32), backend);
     let height = |s: &Simulation| f64::from(s.world.bodies[2].position.y);
@@ -168,7 +168,7 @@ fn what_a_load_leaves_behind_stays_where_it_is(open: Open) {
 /// How far a cube with `speed` slides on level ground [m].
 fn slide(backend: Box<dyn Backend>, speed: f32, friction: f32) -> f64 {
     let mut world = ground(0.0, friction);
-    world.add(cube().position(0.0, 0.5, 0.0).friction(friction).velocity(Vec3::X * speed, Vec3::ZERO));
+    world.insert(cube().position(0.0, 0.5, 0.0).friction(friction).velocity(Vec3::X * speed, Vec3::ZERO));
     f64::from(run(world, backend, 1.5, 240).bodies[1].position.x)
 }
 
@@ -186,7 +186,7 @@ fn a_box_below_the_friction_angle_stays_where_it_is(open: Open) {
     // tan 30 degrees is 0.577.
     let mut world = ground(FRAC_PI_6, 0.6);
     let start = Vec3::new(0.0, 0.5, 0.0);
-    world.add(cube().position(start.x, start.y, start.z).friction(0.6));
+    world.insert(cube().position(start.x, start.y, start.z).friction(0.6));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep(), backend);
     let mut farthest = 0.0_f32;
     for _ in 0..600 {
@@ -199,7 +199,7 @@ fn a_box_below_the_friction_angle_stays_where_it_is(open: Open) {
 /// Acceleration of a cube on a slope of 30° [m/s²], from where it is after 2 s.
 fn slip(backend: Box<dyn Backend>, friction: f32) -> f64 {
     let mut world = ground(FRAC_PI_6, friction);
-    world.add(cube().position(0.0, 0.5, 0.0).friction(friction));
+    world.insert(cube().position(0.0, 0.5, 0.0).friction(friction));
     let slid = run(world, backend, 2.0, 240);
     f64::from(slid.bodies[1].position.x) * 2.0 / (2.0 * 2.0)
 }
@@ -216,7 +216,7 @@ fn a_box_above_the_friction_angle_slides_as_fast_as_coulomb_says(open: Open) {
 fn roll(backend: Box<dyn Backend>, speed: f32) -> (f64, f64) {
     let mut world = ground(0.0, 0.3);
     let ball = Body::dynamic().shape(Shape::ball(0.5)).friction(0.3).position(0.0, 0.5, 0.0);
-    world.add(ball.velocity(Vec3::X * speed, Vec3::ZERO));
+    world.insert(ball.velocity(Vec3::X * speed, Vec3::ZERO));
     let ball = &run(world, backend, 1.0, 240).bodies[1];
     (ball.linear_velocity.x.into(), (-ball.angular_velocity.z).into())
 }
@@ -235,9 +235,9 @@ fn a_sliding_ball_ends_up_rolling_at_five_sevenths_of_its_speed(open: Open) {
 fn collision(backend: Box<dyn Backend>, config: SolverConfig, rate: u32) -> [f64; 2] {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    world.add(cube().position(-1.1875, 0.125, 0.0625).velocity(Vec3::new(3.0, 0.5, -0.2), Vec3::new(0.3, 0.2, 1.0)));
+    world.insert(cube().position(-1.1875, 0.125, 0.0625).velocity(Vec3::new(3.0, 0.5, -0.2), Vec3::new(0.3, 0.2, 1.0)));
     let brick = Body::dynamic().shape(Shape::cuboid(0.6, 0.4, 0.3)).rotation(Quat::from_rotation_z(0.4));
-    world.add(brick.position(0.25, 0.5, 0.0).velocity(Vec3::new(-1.0, 0.0, 0.3), Vec3::new(0.0, -0.5, 0.0)));
+    world.insert(brick.position(0.25, 0.5, 0.0).velocity(Vec3::new(-1.0, 0.0, 0.3), Vec3::new(0.0, -0.5, 0.0)));
     let momentum = |b: &Body| b.linear_velocity.as_dvec3() * f64::from(b.mass.mass);
     let sizes = |of: &dyn Fn(&Body) -> DVec3| world.bodies.iter().map(|b| of(b).length()).sum::<f64>();
     let (linear, angular) = (sizes(&momentum), sizes(&Body::angular_momentum));
@@ -289,7 +289,7 @@ fn bounce(backend: Box<dyn Backend>, mass: f32, restitution: f32) -> [f64; 2] {
     world.gravity = Vec3::ZERO;
     for (x, mass, v) in [(-1.0, 1.0, 3.0), (1.0, mass, -1.0)] {
         let ball = Body::dynamic().shape(Shape::ball(0.5)).total_mass(mass).restitution(restitution);
-        world.add(ball.position(x, 0.0, 0.0).velocity(Vec3::X * v, Vec3::ZERO));
+        world.insert(ball.position(x, 0.0, 0.0).velocity(Vec3::X * v, Vec3::ZERO));
     }
     let after = run(world, backend, 1.0, 60);
     [0, 1].map(|i| after.bodies[i].linear_velocity.x.into())
@@ -338,7 +338,7 @@ fn every_shape_comes_to_rest_on_a_half_space(open: Open) {
     let name = backend.name();
     let mut world = ground(0.0, 0.5);
     for (k, (shape, body)) in shapes.iter().enumerate() {
-        world.add(body.clone().named(*shape).position(3.0 * k as f32, 0.8, 0.0));
+        world.insert(body.clone().named(*shape).position(3.0 * k as f32, 0.8, 0.0));
     }
     let rested = run(world, backend, 5.0, 60);
     for body in &rested.bodies[1..] {

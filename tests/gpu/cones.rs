@@ -2,7 +2,7 @@
 
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
-use drystone::{Axis, Body, Cpu, Joint, Shape, Simulation, SolverConfig, World};
+use drystone::{Axis, Body, BodyHandle, Cpu, Joint, Shape, Simulation, SolverConfig, World};
 
 use crate::common::state::{all_bits, reference};
 use crate::common::{Open, gpu};
@@ -42,11 +42,11 @@ fn arm(turn: Quat) -> Body {
 }
 
 /// The joint of an arm, and its cone.
-fn shoulder(world: &mut World, body: usize, cone: f32) {
+fn shoulder(world: &mut World, body: BodyHandle, cone: f32) {
     let of = &world.bodies[body];
     let shoulder = Joint::to_world(body, Vec3::Y * 0.5, of.position + of.rotation * Vec3::Y * 0.5).along(Vec3::Y);
-    world.join(shoulder);
-    world.join(shoulder.cone(cone));
+    world.insert_joint(shoulder);
+    world.insert_joint(shoulder.cone(cone));
 }
 
 /// The angle between the first axes.
@@ -58,7 +58,7 @@ fn an_arm_that_is_pushed_rests_on_its_cone_on_every_side(open: Open) {
     for solver in SOLVERS {
         for (cone, side) in [(0.3, 0.0_f32), (0.3, 2.0), (1.2, 4.0), (2.0, 5.5)] {
             let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-            let body = world.add(arm(Quat::IDENTITY).angular_damping(4.0).linear_damping(4.0));
+            let body = world.insert(arm(Quat::IDENTITY).angular_damping(4.0).linear_damping(4.0));
             shoulder(&mut world, body, cone);
             let mut simulation = simulation(world, solver, open);
             let (sine, cosine) = side.sin_cos();
@@ -78,11 +78,11 @@ fn an_arm_that_is_pushed_rests_on_its_cone_on_every_side(open: Open) {
 fn a_cone_with_a_limited_twist_holds_both(open: Open) {
     for solver in SOLVERS {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-        let body = world.add(arm(Quat::IDENTITY).angular_damping(4.0).linear_damping(4.0));
+        let body = world.insert(arm(Quat::IDENTITY).angular_damping(4.0).linear_damping(4.0));
         let shoulder = Joint::to_world(body, Vec3::Y * 0.5, Vec3::ZERO).along(Vec3::Y);
         let twist = [Axis::limited(-0.2, 0.4), Axis::FREE, Axis::FREE];
-        world.join(shoulder.generic([Axis::LOCKED; 3], twist));
-        world.join(shoulder.cone(0.5));
+        world.insert_joint(shoulder.generic([Axis::LOCKED; 3], twist));
+        world.insert_joint(shoulder.cone(0.5));
         let mut simulation = simulation(world, solver, open);
         simulation.world.bodies[body].force = Vec3::new(9.0, -9.0, 0.0);
         simulation.world.bodies[body].torque = Vec3::Y;
@@ -104,7 +104,7 @@ fn whirling() -> World {
     let mut world = World::new();
     for k in 0..24 {
         let (cone, k) = (cone_of(k), k as f32);
-        let body = world.add(arm(Quat::from_rotation_y(k) * Quat::from_rotation_x(0.9 * cone)));
+        let body = world.insert(arm(Quat::from_rotation_y(k) * Quat::from_rotation_x(0.9 * cone)));
         let spin = Vec3::new((2.1 * k).sin(), 0.7 * (1.3 * k).cos(), (0.9 * k).cos()) * (1.0 + 0.3 * k);
         let moving = world.bodies[body].clone();
         let at = moving.position;
@@ -141,11 +141,11 @@ fn arms_that_whirl_stay_in_their_cones_and_make_no_energy() {
 fn two_bodies_in_a_cone_keep_their_momenta() {
     for solver in SOLVERS {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-        let a = world.add(arm(Quat::IDENTITY).velocity(Vec3::X, Vec3::new(1.0, 3.0, -4.0)));
-        let b = world.add(arm(Quat::IDENTITY).position(0.0, 0.5, 0.0).velocity(Vec3::X, Vec3::new(-2.0, 0.0, 3.0)));
+        let a = world.insert(arm(Quat::IDENTITY).velocity(Vec3::X, Vec3::new(1.0, 3.0, -4.0)));
+        let b = world.insert(arm(Quat::IDENTITY).position(0.0, 0.5, 0.0).velocity(Vec3::X, Vec3::new(-2.0, 0.0, 3.0)));
         let shoulder = Joint::new(a, Vec3::Y * 0.5, b, Vec3::Y * -0.5).along(Vec3::Y);
-        world.join(shoulder);
-        world.join(shoulder.cone(0.6));
+        world.insert_joint(shoulder);
+        world.insert_joint(shoulder.cone(0.6));
         let momenta = |world: &World| {
             let all = world.bodies.iter().map(|body| {
                 let p = body.linear_velocity * body.mass.mass;
@@ -189,7 +189,7 @@ fn lanes_have_the_bits_of_the_reference_with_cones() {
 fn a_cone_out_of_range_is_an_error() {
     for angle in [0.0, -1.0, 3.2, f32::NAN] {
         let mut world = World::new();
-        let body = world.add(arm(Quat::IDENTITY));
+        let body = world.insert(arm(Quat::IDENTITY));
         shoulder(&mut world, body, angle);
         let error = world.check().expect_err("it is refused").to_string();
         assert!(error.contains("limits 0 and NaN"), "{error}");

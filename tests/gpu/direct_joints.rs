@@ -51,15 +51,16 @@ fn energy(world: &World, substep: f32) -> f64 {
 fn chain(links: usize, ratio: f32) -> World {
     let mut world = World::new();
     let bar = Body::dynamic().shape(Shape::cuboid(0.25, 0.05, 0.05)).density(500.0);
+    let mut before = None;
     for k in 0..=links {
         let is_end = k == links;
         let half = if is_end { 0.5 } else { 0.25 };
         let ball = || Body::dynamic().shape(Shape::ball(0.5)).total_mass(ratio * bar.mass.mass);
         let body = if is_end { ball() } else { bar.clone() };
-        let index = world.add(body.position(0.5 * k as f32 + half, 0.0, 0.0));
-        world.join(match k {
-            0 => Joint::to_world(index, -half * Vec3::X, Vec3::ZERO),
-            _ => Joint::new(index - 1, 0.25 * Vec3::X, index, -half * Vec3::X),
+        let link = world.insert(body.position(0.5 * k as f32 + half, 0.0, 0.0));
+        world.insert_joint(match before.replace(link) {
+            None => Joint::to_world(link, -half * Vec3::X, Vec3::ZERO),
+            Some(before) => Joint::new(before, 0.25 * Vec3::X, link, -half * Vec3::X),
         });
     }
     world
@@ -196,18 +197,18 @@ fn gap_of_locks(world: &World) -> f32 {
 fn machine() -> World {
     let mut world = World::new();
     let bar = |x: f32, y: f32| Body::dynamic().shape(Shape::cuboid(0.4, 0.05, 0.05)).position(x, y, 0.0);
-    let frame = world.add(bar(0.4, 0.0));
-    world.join(Joint::to_world(frame, -0.4 * Vec3::X, Vec3::ZERO).hinge(Vec3::Z));
-    let weld = world.add(bar(1.2, 0.0).total_mass(50.0));
-    world.join(Joint::new(frame, 0.4 * Vec3::X, weld, -0.4 * Vec3::X).fixed());
-    let crank = world.add(bar(2.0, 0.0).total_mass(0.5));
-    world.join(Joint::new(weld, 0.4 * Vec3::X, crank, -0.4 * Vec3::X).hinge(Vec3::Z).motor(2.0, 20.0));
-    let sled = world.add(bar(1.2, 0.3).total_mass(5.0));
-    world.join(Joint::new(sled, -0.3 * Vec3::Y, weld, Vec3::ZERO).slider(Vec3::X).limited(-0.1, 0.2));
-    let blade = world.add(bar(2.0, 0.3));
-    world.join(Joint::new(sled, 0.4 * Vec3::X, blade, -0.4 * Vec3::X).hinge(Vec3::Y).spring(0.3, 2.0, 0.1));
-    let bob = world.add(Body::dynamic().shape(Shape::ball(0.1)).position(0.8, -0.6, 0.0));
-    world.join(Joint::new(bob, Vec3::ZERO, frame, 0.4 * Vec3::X).rod(0.6));
+    let frame = world.insert(bar(0.4, 0.0));
+    world.insert_joint(Joint::to_world(frame, -0.4 * Vec3::X, Vec3::ZERO).hinge(Vec3::Z));
+    let weld = world.insert(bar(1.2, 0.0).total_mass(50.0));
+    world.insert_joint(Joint::new(frame, 0.4 * Vec3::X, weld, -0.4 * Vec3::X).fixed());
+    let crank = world.insert(bar(2.0, 0.0).total_mass(0.5));
+    world.insert_joint(Joint::new(weld, 0.4 * Vec3::X, crank, -0.4 * Vec3::X).hinge(Vec3::Z).motor(2.0, 20.0));
+    let sled = world.insert(bar(1.2, 0.3).total_mass(5.0));
+    world.insert_joint(Joint::new(sled, -0.3 * Vec3::Y, weld, Vec3::ZERO).slider(Vec3::X).limited(-0.1, 0.2));
+    let blade = world.insert(bar(2.0, 0.3));
+    world.insert_joint(Joint::new(sled, 0.4 * Vec3::X, blade, -0.4 * Vec3::X).hinge(Vec3::Y).spring(0.3, 2.0, 0.1));
+    let bob = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(0.8, -0.6, 0.0));
+    world.insert_joint(Joint::new(bob, Vec3::ZERO, frame, 0.4 * Vec3::X).rod(0.6));
     world
 }
 
@@ -234,8 +235,8 @@ fn a_machine_of_all_kinds_moves_as_it_does_with_many_short_steps(open: Open) {
 fn a_slider_that_spins_keeps_its_energy() {
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     let bar = || Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.05));
-    let (a, b) = (world.add(bar().position(0.2, 0.1, 0.0)), world.add(bar().position(-0.2, -0.1, 0.0)));
-    world.join(Joint::new(a, -0.1 * Vec3::Y, b, 0.1 * Vec3::Y).slider(Vec3::X).limited(-1.0, 1.0));
+    let (a, b) = (world.insert(bar().position(0.2, 0.1, 0.0)), world.insert(bar().position(-0.2, -0.1, 0.0)));
+    world.insert_joint(Joint::new(a, -0.1 * Vec3::Y, b, 0.1 * Vec3::Y).slider(Vec3::X).limited(-1.0, 1.0));
     for body in [a, b] {
         let spin = Vec3::new(8.0, 3.0, 12.0);
         world.bodies[body].linear_velocity = spin.cross(world.bodies[body].position);
@@ -255,8 +256,8 @@ fn a_slider_that_spins_keeps_its_energy() {
 
 fn a_rope_is_solved_with_its_set() {
     let mut world = with_joints(chain(5, 100.0), |joint| joint.hinge(Vec3::Z));
-    let bob = world.add(Body::dynamic().shape(Shape::ball(0.1)).position(2.0, -1.0, 0.0));
-    world.join(Joint::new(3, 0.25 * Vec3::X, bob, Vec3::ZERO).rope(1.0));
+    let bob = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(2.0, -1.0, 0.0));
+    world.insert_joint(Joint::new(3, 0.25 * Vec3::X, bob, Vec3::ZERO).rope(1.0));
     let mut simulation = simulation(world, JointSolver::Direct);
     let stats = simulation.step(DT).expect("a step");
     assert_eq!((stats.direct_joints, stats.joints), (7, 7));
@@ -268,24 +269,27 @@ fn a_rope_is_solved_with_its_set() {
 fn polygon(corners: &[Vec3], closes: bool) -> World {
     let mut world = World::new();
     let count = corners.len() - usize::from(!closes);
+    let mut before = None;
     for k in 0..count {
         let (from, to) = (corners[k], corners[(k + 1) % corners.len()]);
         let (middle, half) = (0.5 * (from + to), 0.5 * from.distance(to));
         let turn = Quat::from_rotation_arc(Vec3::X, (to - from).normalize());
         let bar = Body::dynamic().shape(Shape::cuboid(half, 0.05, 0.05)).rotation(turn);
-        let index = world.add(bar.position(middle.x, middle.y, middle.z));
-        match k {
-            0 => world.join(Joint::to_world(index, -half * Vec3::X, from)),
-            _ => {
-                let before = 0.5 * corners[k - 1].distance(from);
-                world.join(Joint::new(index - 1, before * Vec3::X, index, -half * Vec3::X))
-            }
-        };
+        let bar = world.insert(bar.position(middle.x, middle.y, middle.z));
+        world.insert_joint(match before.replace((bar, half * Vec3::X)) {
+            None => Joint::to_world(bar, -half * Vec3::X, from),
+            Some((before, end)) => Joint::new(before, end, bar, -half * Vec3::X),
+        });
         if k + 1 == count {
             if closes {
-                world.join(Joint::new(index, half * Vec3::X, 0, -0.5 * corners[0].distance(corners[1]) * Vec3::X));
+                world.insert_joint(Joint::new(
+                    bar,
+                    half * Vec3::X,
+                    0,
+                    -0.5 * corners[0].distance(corners[1]) * Vec3::X,
+                ));
             } else {
-                world.join(Joint::to_world(index, half * Vec3::X, to));
+                world.insert_joint(Joint::to_world(bar, half * Vec3::X, to));
             }
         }
     }
@@ -347,8 +351,8 @@ fn a_tree_with_branches_stays_together() {
         let x = place * 16.0 / (1 << depth) as f32;
         let bar = Body::dynamic().shape(Shape::cuboid(0.05, 0.5, 0.05));
         let mass = if depth == 4 { 500.0 } else { 1.0 } * bar.mass.mass;
-        let index = world.add(bar.total_mass(mass).position(x, -(depth as f32), 0.0));
-        world.join(match k.checked_sub(1) {
+        let index = world.insert(bar.total_mass(mass).position(x, -(depth as f32), 0.0));
+        world.insert_joint(match k.checked_sub(1) {
             None => Joint::to_world(index, 0.5 * Vec3::Y, Vec3::new(x, 0.5, 0.0)),
             Some(k) => {
                 let above = world.bodies[k / 2].position;
@@ -371,15 +375,15 @@ fn a_sheet_in_a_plane_stays_together_though_its_loops_hold_it_twice() {
     for i in 0..n * n {
         let (column, row) = (i % n, i / n);
         let place = 0.5 * Vec3::new(column as f32, 0.0, row as f32);
-        world.add(Body::dynamic().shape(Shape::ball(0.2)).position(place.x, place.y, place.z));
+        world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(place.x, place.y, place.z));
         if column > 0 {
-            world.join(Joint::new(i - 1, 0.25 * Vec3::X, i, -0.25 * Vec3::X));
+            world.insert_joint(Joint::new(i - 1, 0.25 * Vec3::X, i, -0.25 * Vec3::X));
         }
         if row > 0 {
-            world.join(Joint::new(i - n, 0.25 * Vec3::Z, i, -0.25 * Vec3::Z));
+            world.insert_joint(Joint::new(i - n, 0.25 * Vec3::Z, i, -0.25 * Vec3::Z));
         }
         if [0, n - 1].contains(&column) && [0, n - 1].contains(&row) {
-            world.join(Joint::to_world(i, Vec3::ZERO, place));
+            world.insert_joint(Joint::to_world(i, Vec3::ZERO, place));
         }
     }
     let middle = n * n / 2 + n / 2;
@@ -398,8 +402,8 @@ fn a_ball_of_next_to_no_inertia_at_a_long_arm_stays_where_it_is_tied() {
             let mut world = chain(5, 10.0);
             let end = world.bodies[5].position;
             let ball = Body::dynamic().shape(Shape::ball(0.001)).position(end.x + 1.0, end.y, end.z);
-            let ball = world.add(ball.velocity(k as f32 * 1e-4 * Vec3::Z, Vec3::ZERO));
-            world.join(Joint::new(5, Vec3::ZERO, ball, -Vec3::X));
+            let ball = world.insert(ball.velocity(k as f32 * 1e-4 * Vec3::Z, Vec3::ZERO));
+            world.insert_joint(Joint::new(5, Vec3::ZERO, ball, -Vec3::X));
             let mut simulation = simulation(world, JointSolver::Direct);
             let gap = largest_gap(&mut simulation, 600);
             assert!(simulation.world.first_non_finite().is_none());
@@ -419,7 +423,7 @@ fn a_chain_that_falls_on_the_ground_lies_there() {
         for height in [0.6, 0.61, 0.62, 0.65, 0.7] {
             let mut world = chain(30, 100.0);
             world.remove_joint(world.joints.handles()[0]);
-            world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).position(0.0, -height, 0.0));
+            world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).position(0.0, -height, 0.0));
             let mut simulation = simulation(world, solver);
             let gap = largest_gap(&mut simulation, 900);
             let overlap = simulation.penetration().max;
@@ -458,7 +462,7 @@ fn lanes_and_threads_have_the_bits_of_the_reference() {
         let own = chain(10 + 7 * lane, 200.0);
         for body in own.bodies {
             let Vec3 { x, y, .. } = body.position;
-            world.add(body.position(x, y, 3.0 * lane as f32));
+            world.insert(body.position(x, y, 3.0 * lane as f32));
         }
         for (k, &joint) in own.joints.iter().enumerate() {
             let a = first + joint.body_a.index();
@@ -467,7 +471,7 @@ fn lanes_and_threads_have_the_bits_of_the_reference() {
                 Some(b) => Joint::new(a, joint.anchor_a, first + b.index(), joint.anchor_b),
             };
             // The last chains have joints of other kinds between the balls.
-            world.join(match (lane, k % 5) {
+            world.insert_joint(match (lane, k % 5) {
                 (3.., 1) => tie.hinge(Vec3::Z).limited(-0.5, 0.5),
                 (3.., 2) => tie.fixed(),
                 (4, 3) => tie.slider(Vec3::X).spring(0.0, 3.0, 0.1),

@@ -143,12 +143,12 @@ fn a_ball_that_bounces_begins_and_ends_with_every_bounce() {
 /// Balls and cubes of several masses, materials and sizes fall into each other.
 fn heap() -> World {
     let mut world = World::new();
-    world.add(floor());
+    world.insert(floor());
     for i in 0..24 {
         let (x, y) = ((i % 4) as f32 * 0.9, 1.0 + (i / 4) as f32 * 1.3);
         let body = if i % 3 == 0 { ball(0.0) } else { cube(0.0, 0.0) };
         let body = body.density(200.0 * (1 + i % 5) as f32).restitution(0.1 * (i % 6) as f32);
-        world.add(body.position(x, y, 0.3 * (i % 2) as f32).rotation(Quat::from_rotation_y(0.4 * i as f32)));
+        world.insert(body.position(x, y, 0.3 * (i % 2) as f32).rotation(Quat::from_rotation_y(0.4 * i as f32)));
     }
     world
 }
@@ -159,8 +159,8 @@ fn given(simulation: &mut Simulation) -> Vec<Vec3> {
     for manifold in simulation.manifolds() {
         // A contact that rests keeps what it had.
         let impulse = manifold.summed.expect("somebody listens");
-        given[manifold.body_a] -= impulse;
-        given[manifold.body_b] += impulse;
+        given[manifold.a.body.index()] -= impulse;
+        given[manifold.b.body.index()] += impulse;
     }
     given
 }
@@ -210,11 +210,11 @@ fn a_ball_loses_the_summed_impulse_in_every_step() {
         }
     }
     let mut world = World::new();
-    world.add(floor());
+    world.insert(floor());
     for i in 0..4 {
-        world.add(cube(0.0, 0.5 + i as f32));
+        world.insert(cube(0.0, 0.5 + i as f32));
     }
-    world.add(cube(0.0, 6.5).density(100_000.0));
+    world.insert(cube(0.0, 6.5).density(100_000.0));
     for open in EXACT {
         let mut tower = simulation(&world, &config, open(), Listen::default());
         assert!((0..90).any(|_| tower.step(DT).map(|_| tower.substeps_of(1) > config.substeps).expect("a step")));
@@ -550,7 +550,7 @@ fn a_sensor_has_no_mass_and_holds_nobody() {
     let sensing = plain.clone().sensor_at(Shape::ball(2.0), Vec3::X, Quat::IDENTITY);
     assert_eq!(plain.mass, sensing.mass);
     let mut world = World::new();
-    world.add(Body::fixed().sensor(Shape::cuboid(5.0, 0.5, 5.0)));
+    world.insert(Body::fixed().sensor(Shape::cuboid(5.0, 0.5, 5.0)));
     let cube = world.insert(sensing);
     let mut simulation = hears_sensors(&world, cpu());
     run(&mut simulation, 60);
@@ -559,7 +559,7 @@ fn a_sensor_has_no_mass_and_holds_nobody() {
     assert_eq!(body.mass, plain.mass);
     let refused = World::check(&{
         let mut world = World::new();
-        world.add(Body::fixed().sensor(Shape::half_space(Vec3::Y)));
+        world.insert(Body::fixed().sensor(Shape::half_space(Vec3::Y)));
         world
     });
     assert!(refused.is_err_and(|e| e.to_string().contains("cannot be sensors")));
@@ -580,18 +580,17 @@ fn the_contacts_of_a_body_are_those_of_all_that_name_it() {
         let solved: Vec<_> = simulation.manifolds().collect();
         assert_eq!(solved.len(), simulation.contacts().count());
         for manifold in solved {
-            let same =
-                |c: &drystone::Contact| [c.a, c.b].map(|side| side.body.index()) == [manifold.body_a, manifold.body_b];
+            let same = |c: &drystone::Contact| [c.a, c.b] == [manifold.a, manifold.b];
             let contact = simulation.contacts().find(same).expect("the contact");
             assert_eq!((contact.normal, contact.impulse), (manifold.normal, manifold.summed.unwrap_or_default()));
             for (point, solved) in contact.points().iter().zip(manifold.points()) {
                 assert_eq!(point.separation, solved.separation);
-                let surface = |body: usize, anchor: Vec3| {
+                let surface = |body: BodyHandle, anchor: Vec3| {
                     let body = &simulation.world.bodies[body];
                     body.position + body.rotation * anchor
                 };
-                let on_a = surface(manifold.body_a, solved.anchor_a);
-                let on_b = surface(manifold.body_b, solved.anchor_b);
+                let on_a = surface(manifold.a.body, solved.anchor_a);
+                let on_b = surface(manifold.b.body, solved.anchor_b);
                 assert!((0.5 * (on_a + on_b)).distance(point.position) < 1e-5, "{point:?}");
             }
         }

@@ -114,8 +114,8 @@ fn mixture() -> Scene {
     let mut above = None;
     for i in 0..8 {
         let link = Body::dynamic().shape(Shape::cuboid(0.05, 0.25, 0.1)).position(10.0, 8.0 - 0.5 * i as f32, 0.0);
-        let link = scene.world.add(link.velocity(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)));
-        scene.world.join(match above {
+        let link = scene.world.insert(link.velocity(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)));
+        scene.world.insert_joint(match above {
             None => Joint::to_world(link, end, Vec3::new(10.0, 8.25, 0.0)),
             Some(above) => Joint::new(above, -end, link, end),
         });

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use drystone::glam::{Quat, Vec3};
 use drystone::{
-    Body, ColliderOf, ContactHooks, Cpu, Error, Listen, PendingContact, Shape, Simulation, SolverConfig, World,
+    Body, BodyHandle, ColliderOf, ContactHooks, Cpu, Error, Listen, PendingContact, Shape, Simulation, SolverConfig,
+    World,
 };
 
 use crate::common::state::{all_bits, reference};
@@ -59,11 +60,11 @@ struct Hooks<F, M>(F, M);
 
 impl<F, M> ContactHooks for Hooks<F, M>
 where
-    F: FnMut(&World, usize, usize) -> bool + Send + Sync,
+    F: FnMut(&World, BodyHandle, BodyHandle) -> bool + Send + Sync,
     M: FnMut(&World, &mut PendingContact) + Send + Sync,
 {
     fn may_touch(&mut self, world: &World, a: ColliderOf, b: ColliderOf) -> bool {
-        self.0(world, a.body.index(), b.body.index())
+        self.0(world, a.body, b.body)
     }
 
     fn modify(&mut self, world: &World, contact: &mut PendingContact) {
@@ -71,14 +72,14 @@ where
     }
 }
 
-fn all(_: &World, _: usize, _: usize) -> bool {
+fn all(_: &World, _: BodyHandle, _: BodyHandle) -> bool {
     true
 }
 
 fn nothing(_: &World, _: &mut PendingContact) {}
 
 fn filtering(
-    filter: impl FnMut(&World, usize, usize) -> bool + Send + Sync + 'static,
+    filter: impl FnMut(&World, BodyHandle, BodyHandle) -> bool + Send + Sync + 'static,
 ) -> Option<Box<dyn ContactHooks>> {
     Some(Box::new(Hooks(filter, nothing)))
 }
@@ -90,11 +91,11 @@ fn modifying(modify: impl FnMut(&World, &mut PendingContact) + Send + Sync + 'st
 /// A plate of 10 cm at a height of 2 m, and cubes below it that go up at different speeds.
 fn a_body_rises_through_a_one_way_platform_and_lands_on_it(open: Open) {
     let mut world = World::new();
-    let plate = world.add(Body::fixed().shape(Shape::cuboid(30.0, 0.05, 1.0)).position(0.0, 2.0, 0.0));
+    let plate = world.insert(Body::fixed().shape(Shape::cuboid(30.0, 0.05, 1.0)).position(0.0, 2.0, 0.0));
     let apex = [1.5_f32, 3.5, 4.0, 30.0];
     for (k, &apex) in apex.iter().enumerate() {
         let v = Vec3::Y * (2.0 * G * apex).sqrt();
-        world.add(cube().position(3.0 * k as f32, 0.0, 0.0).velocity(v, Vec3::ZERO));
+        world.insert(cube().position(3.0 * k as f32, 0.0, 0.0).velocity(v, Vec3::ZERO));
     }
     let mut simulation = simulation(world, open);
     simulation.set_hooks(filtering(move |world, a, b| {
@@ -124,9 +125,9 @@ fn a_body_rises_through_a_one_way_platform_and_lands_on_it(open: Open) {
 fn refused_bodies_pass_through_each_other_at_any_speed(open: Open) {
     for is_refused in [true, false] {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-        world.add(Body::fixed().shape(Shape::cuboid(0.01, 5.0, 5.0)));
+        world.insert(Body::fixed().shape(Shape::cuboid(0.01, 5.0, 5.0)));
         let shot = Body::dynamic().shape(Shape::ball(0.1)).position(-5.0, 0.3, 0.0);
-        let shot = world.add(shot.velocity(Vec3::X * 200.0, Vec3::ZERO).swept());
+        let shot = world.insert(shot.velocity(Vec3::X * 200.0, Vec3::ZERO).swept());
         let mut simulation = simulation(world, open);
         // As a filter, and as a hook that drops all points.
         let by_filter = filtering(move |_, _, _| !is_refused);
@@ -152,8 +153,8 @@ fn refused_bodies_pass_through_each_other_at_any_speed(open: Open) {
 /// A cube slides with the friction of its material, and from a time on without any: its contact is the same one.
 fn a_hook_changes_the_friction_of_a_contact_that_is_reused(open: Open) {
     let mut world = World::new();
-    world.add(floor());
-    let slider = world.add(cube().position(0.0, 0.5, 0.0).velocity(Vec3::X * 6.0, Vec3::ZERO));
+    world.insert(floor());
+    let slider = world.insert(cube().position(0.0, 0.5, 0.0).velocity(Vec3::X * 6.0, Vec3::ZERO));
     let mut simulation = simulation(world, open);
     let mut speeds = Vec::new();
     for friction in [0.5, 0.0, 0.2] {
@@ -174,8 +175,8 @@ fn a_hook_changes_the_friction_of_a_contact_that_is_reused(open: Open) {
 /// A ball of a material without restitution, that every bounce gives another one.
 fn a_hook_changes_the_restitution_of_every_bounce(open: Open) {
     let mut world = World::new();
-    world.add(floor());
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.2)).position(0.0, 1.2, 0.0));
+    world.insert(floor());
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(0.0, 1.2, 0.0));
     let mut simulation = simulation(world, open);
     for (height, e) in [(1.0_f32, 0.8_f32), (0.64, 0.5), (0.16, 0.9)] {
         simulation.set_hooks(modifying(move |_, contact| contact.restitution = e));
@@ -201,8 +202,8 @@ fn a_hook_changes_the_restitution_of_every_bounce(open: Open) {
 /// A cube that only the points of one side hold turns about them: 3 g/4 a for sides a.
 fn a_cube_that_keeps_two_points_tips_about_them(open: Open) {
     let mut world = World::new();
-    world.add(floor());
-    let body = world.add(cube().position(0.0, 0.5, 0.0).friction(2.0));
+    world.insert(floor());
+    let body = world.insert(cube().position(0.0, 0.5, 0.0).friction(2.0));
     let mut simulation = simulation(world, open);
     steps(&mut simulation, 10);
     simulation.set_hooks(modifying(|_, contact| {
@@ -222,8 +223,8 @@ fn a_cube_that_keeps_two_points_tips_about_them(open: Open) {
 
 fn points_that_were_dropped_once_are_there_in_the_next_step() {
     let mut world = World::new();
-    world.add(floor());
-    world.add(cube().position(0.0, 0.5, 0.0));
+    world.insert(floor());
+    world.insert(cube().position(0.0, 0.5, 0.0));
     let mut simulation = simulation(world, reference);
     steps(&mut simulation, 10);
     let points = |simulation: &mut Simulation| simulation.manifolds().map(|m| m.points().len()).collect::<Vec<_>>();
@@ -240,7 +241,7 @@ fn points_that_were_dropped_once_are_there_in_the_next_step() {
 /// Cubes, balls and boards that fall on each other.
 fn heap() -> World {
     let mut world = World::new();
-    world.add(floor());
+    world.insert(floor());
     for k in 0..24 {
         let shape = match k % 3 {
             0 => Shape::cuboid(0.3, 0.2, 0.25),
@@ -249,7 +250,7 @@ fn heap() -> World {
         };
         let at = Vec3::new(0.35 * (k % 4) as f32, 0.4 + 0.3 * k as f32, 0.3 * (k % 3) as f32);
         let turn = Quat::from_scaled_axis(Vec3::new(0.2, 0.3, 0.1) * k as f32);
-        world.add(Body::dynamic().shape(shape).position(at.x, at.y, at.z).rotation(turn));
+        world.insert(Body::dynamic().shape(shape).position(at.x, at.y, at.z).rotation(turn));
     }
     world
 }
@@ -257,7 +258,10 @@ fn heap() -> World {
 /// Rules that depend on the world only: every fifth body passes through every seventh, balls are icy, cubes bounce, and
 /// boards lie on half of their points.
 fn rules() -> Option<Box<dyn ContactHooks>> {
-    let filter = |_: &World, a: usize, b: usize| !(a.is_multiple_of(5) && b.is_multiple_of(7) && a > 0);
+    let filter = |_: &World, a: BodyHandle, b: BodyHandle| {
+        let [a, b] = [a, b].map(BodyHandle::index);
+        !(a.is_multiple_of(5) && b.is_multiple_of(7) && a > 0)
+    };
     let modify = |world: &World, contact: &mut PendingContact| {
         let is = |kind: usize| [contact.a, contact.b].iter().any(|side| side.body.index() % 3 == kind);
         let (bounces, is_icy, is_board) = (is(1), is(2), is(0));
@@ -267,7 +271,7 @@ fn rules() -> Option<Box<dyn ContactHooks>> {
         if bounces {
             contact.restitution = 0.4;
         }
-        if is_board && world.bodies[contact.b.body.index()].linear_velocity.y < -1.0 {
+        if is_board && world.bodies[contact.b.body].linear_velocity.y < -1.0 {
             contact.points_mut()[0].is_dropped = true;
         }
     };
@@ -298,8 +302,8 @@ fn a_gpu_has_the_bits_of_the_reference_with_hooks() {
 /// Without friction it goes in the very next step.
 fn a_hook_takes_the_friction_from_a_contact_at_rest_at_once() {
     let mut world = World::new();
-    world.add(floor());
-    let body = world.add(cube().position(0.0, 0.5, 0.0));
+    world.insert(floor());
+    let body = world.insert(cube().position(0.0, 0.5, 0.0));
     world.bodies[body].force = Vec3::X * (0.3 * G * world.bodies[body].mass.mass);
     let mut simulation = simulation(world, reference);
     steps(&mut simulation, 10);
@@ -332,7 +336,8 @@ fn calls_come_in_one_order() {
     let calls = |open: Open| {
         let said = Arc::new(Mutex::new(Vec::new()));
         let (asked, told) = (Arc::clone(&said), Arc::clone(&said));
-        let filter = move |_: &World, a: usize, b: usize| {
+        let filter = move |_: &World, a: BodyHandle, b: BodyHandle| {
+            let [a, b] = [a, b].map(BodyHandle::index);
             assert!(a < b);
             asked.lock().expect("no panic").push([a, b, usize::MAX]);
             true
@@ -382,8 +387,8 @@ fn a_hook_that_panics_leaves_the_world_as_it_was() {
 
 fn a_material_out_of_range_is_an_error_that_names_the_bodies() {
     let mut world = World::new();
-    world.add(floor());
-    world.add(cube().named("crate").position(0.0, 0.5, 0.0));
+    world.insert(floor());
+    world.insert(cube().named("crate").position(0.0, 0.5, 0.0));
     let mut simulation = simulation(world, reference);
     let before = all_bits(&simulation.world);
     let mut line = |modify: fn(&World, &mut PendingContact)| {
@@ -401,8 +406,8 @@ fn a_material_out_of_range_is_an_error_that_names_the_bodies() {
 /// Without hooks, a slider has the friction of its material again, and bits do not depend on hooks that change nothing.
 fn contacts_have_their_own_materials_without_hooks() {
     let mut world = World::new();
-    world.add(floor());
-    let slider = world.add(cube().position(0.0, 0.5, 0.0).velocity(Vec3::X * 9.0, Vec3::ZERO));
+    world.insert(floor());
+    let slider = world.insert(cube().position(0.0, 0.5, 0.0).velocity(Vec3::X * 9.0, Vec3::ZERO));
     let mut icy = simulation(world, reference);
     icy.set_hooks(modifying(|_, contact| contact.friction = 0.0));
     steps(&mut icy, 30);
@@ -425,12 +430,12 @@ fn contacts_have_their_own_materials_without_hooks() {
 fn a_body_that_may_not_touch_wakes_no_sleeper() {
     for may_touch in [false, true] {
         let mut world = World::new();
-        world.add(floor());
-        let sleeper = world.add(cube().position(0.0, 0.5, 0.0));
+        world.insert(floor());
+        let sleeper = world.insert(cube().position(0.0, 0.5, 0.0));
         let mut simulation = simulation(world, reference);
         steps(&mut simulation, 60);
         assert!(simulation.is_asleep(sleeper));
-        let ghost = simulation.world.add(cube().position(-3.0, 0.7, 0.0).gravity_scale(0.0));
+        let ghost = simulation.world.insert(cube().position(-3.0, 0.7, 0.0).gravity_scale(0.0));
         simulation.world.bodies[ghost].linear_velocity = Vec3::X * 3.0;
         simulation.set_hooks(filtering(move |_, a, b| may_touch || [a, b] != [sleeper, ghost]));
         let mut woke = false;

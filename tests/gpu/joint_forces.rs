@@ -39,7 +39,7 @@ fn chain(links: usize) -> (World, Vec<JointHandle>) {
     let (mut above, mut joints) = (None, Vec::new());
     for i in 0..links {
         let link = Body::dynamic().shape(Shape::cuboid(0.05, 0.25, 0.05)).total_mass(1.0);
-        let link = world.add(link.position(0.0, -0.25 - 0.5 * i as f32, 0.0));
+        let link = world.insert(link.position(0.0, -0.25 - 0.5 * i as f32, 0.0));
         let top = Vec3::new(0.0, 0.25, 0.0);
         let joint = above.map_or(Joint::to_world(link, top, Vec3::ZERO), |a| Joint::new(a, -top, link, top));
         joints.push(world.insert_joint(joint));
@@ -73,9 +73,9 @@ fn every_link_of_a_chain_pulls_with_what_hangs_on_it(open: Open) {
 
 fn a_weld_bears_the_weight_and_the_moment_of_its_beam(open: Open) {
     let mut world = World::new();
-    let wall = world.add(Body::fixed());
+    let wall = world.insert(Body::fixed());
     let beam = Body::dynamic().shape(Shape::cuboid(0.5, 0.05, 0.05)).total_mass(3.0);
-    let beam = world.add(beam.position(0.5, 0.0, 0.0));
+    let beam = world.insert(beam.position(0.5, 0.0, 0.0));
     let weld = world.insert_joint(Joint::new(wall, Vec3::ZERO, beam, -0.5 * Vec3::X).fixed());
     let mut simulation = simulation(world, awake(), open);
     (0..120).for_each(|_| drop(simulation.step(DT).expect("a step")));
@@ -90,7 +90,7 @@ fn a_weld_bears_the_weight_and_the_moment_of_its_beam(open: Open) {
 fn a_motor_gives_the_mean_torque_that_its_wheel_gained(open: Open) {
     let (speed, most) = (1.0, 200.0);
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-    let wheel = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.1)).total_mass(12.0));
+    let wheel = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.1)).total_mass(12.0));
     let motor = Joint::to_world(wheel, Vec3::ZERO, Vec3::ZERO).hinge(Vec3::Z).motor(speed, most);
     let motor = world.insert_joint(motor);
     let mut simulation = simulation(world, awake(), open);
@@ -132,7 +132,7 @@ fn forces_change_no_bit_and_sleep_with_their_bodies() {
     }
     // Something else moves while the chain sleeps.
     for simulation in &mut each {
-        simulation.world.add(Body::dynamic().shape(Shape::ball(0.1)).position(5.0, 0.0, 0.0));
+        simulation.world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(5.0, 0.0, 0.0));
         simulation.step(DT).expect("a step");
         assert!(simulation.is_asleep(0));
         let force = simulation.joint_force(joints[0]).expect("a step ran");

@@ -76,14 +76,14 @@ fn hung_rod(turned: f32, aside: f32) -> (World, Joint) {
     let anchor = Vec3::new(0.0, 0.5, aside);
     let center = turn * -anchor;
     let rod = Body::dynamic().shape(Shape::cuboid(0.02, 0.5, 0.02)).total_mass(2.0).rotation(turn);
-    let rod = world.add(rod.position(center.x, center.y, center.z));
+    let rod = world.insert(rod.position(center.x, center.y, center.z));
     (world, Joint::to_world(rod, anchor, Vec3::ZERO).hinge(Vec3::Z))
 }
 
 fn a_hinge_swings_with_the_period_of_a_physical_pendulum(open: Open) {
     for amplitude in [0.05, 1.0] {
         let (mut world, hinge) = hung_rod(amplitude, 0.3);
-        world.join(hinge);
+        world.insert_joint(hinge);
         let mut simulation = simulate(world, open);
         let mut samples = Vec::new();
         let mut tilt: f32 = 0.0;
@@ -104,7 +104,7 @@ fn a_hinge_swings_with_the_period_of_a_physical_pendulum(open: Open) {
 
 fn a_limited_hinge_stops_at_its_limits(open: Open) {
     let (mut world, hinge) = hung_rod(1.2, 0.0);
-    world.join(hinge.limited(-0.4, 1.3));
+    world.insert_joint(hinge.limited(-0.4, 1.3));
     let mut simulation = simulate(world, open);
     let (mut least, mut most) = (0.0_f32, 0.0_f32);
     steps(&mut simulation, 1.0, |_, world| (least, most) = (least.min(angle(world)), most.max(angle(world))));
@@ -125,7 +125,7 @@ fn a_limited_hinge_stops_at_its_limits(open: Open) {
 
 fn a_motor_reaches_its_speed(open: Open) {
     let (mut world, hinge) = hung_rod(0.0, 0.0);
-    world.join(hinge.motor(3.0, 40.0));
+    world.insert_joint(hinge.motor(3.0, 40.0));
     let mut simulation = simulate(world, open);
     steps(&mut simulation, 0.5, |_, _| {});
     let (mut slowest, mut fastest, begin) = (f32::MAX, 0.0_f32, angle(&simulation.world));
@@ -145,7 +145,7 @@ fn a_motor_reaches_its_speed(open: Open) {
 fn a_motor_is_no_stronger_than_its_largest_torque(open: Open) {
     let torque = 5.0;
     let (mut world, hinge) = hung_rod(0.3, 0.0);
-    world.join(hinge.motor(0.05, torque));
+    world.insert_joint(hinge.motor(0.05, torque));
     let mut simulation = simulate(world, open);
     steps(&mut simulation, 9.0, |_, _| {});
     let (mut sum, mut count) = (0.0, 0);
@@ -162,10 +162,10 @@ fn a_slider_slides_as_on_an_incline_and_stops_at_its_limit(open: Open) {
     let slope = 0.5_f32;
     let mut world = World::new();
     let down = Vec3::new(slope.cos(), -slope.sin(), 0.0);
-    let cart = world.add(Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)));
+    let cart = world.insert(Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)));
     // The anchor is aside of the center: locks of angles bear a moment.
     let anchor = Vec3::new(0.0, 0.1, 0.2);
-    world.join(Joint::to_world(cart, anchor, anchor).slider(down).limited(-0.5, 2.0));
+    world.insert_joint(Joint::to_world(cart, anchor, anchor).slider(down).limited(-0.5, 2.0));
     let mut simulation = simulate(world, open);
     let along = 0.5 * G * slope.sin();
     steps(&mut simulation, 0.8, |t, world| {
@@ -188,8 +188,8 @@ fn hung_ball(frequency: f32, damping_ratio: f32, open: Open) -> (Simulation, f32
     let mut world = World::new();
     let sag = G / (TAU * frequency).powi(2);
     let ball = Body::dynamic().shape(Shape::ball(0.1)).total_mass(3.0);
-    let ball = world.add(ball.position(0.0, -1.0 - sag + 0.1, 0.0));
-    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).elastic(1.0, frequency, damping_ratio));
+    let ball = world.insert(ball.position(0.0, -1.0 - sag + 0.1, 0.0));
+    world.insert_joint(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).elastic(1.0, frequency, damping_ratio));
     (simulate(world, open), 1.0 + sag)
 }
 
@@ -222,8 +222,8 @@ fn a_damped_spring_loses_the_share_that_its_ratio_says(open: Open) {
 
 fn a_rope_is_slack_and_then_holds(open: Open) {
     let mut world = World::new();
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.1)).position(0.3, -0.2, 0.0));
-    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).rope(1.0));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(0.3, -0.2, 0.0));
+    world.insert_joint(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).rope(1.0));
     let mut simulation = simulate(world, open);
     let mut longest: f32 = 0.0;
     steps(&mut simulation, 4.0, |t, world| {
@@ -239,8 +239,8 @@ fn a_rope_is_slack_and_then_holds(open: Open) {
 /// Its period is that of a mathematical pendulum: the rod pulls at the center of the ball.
 fn a_rod_keeps_its_length(open: Open) {
     let mut world = World::new();
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.1)).position(0.3, -0.4, 0.0));
-    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).rod(0.5));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(0.3, -0.4, 0.0));
+    world.insert_joint(Joint::to_world(ball, Vec3::ZERO, Vec3::ZERO).rod(0.5));
     let mut simulation = simulate(world, open);
     let mut samples = Vec::new();
     steps(&mut simulation, 8.0, |t, world| {
@@ -258,10 +258,10 @@ fn a_rod_keeps_its_length(open: Open) {
 fn a_fixed_cantilever_keeps_its_angle(open: Open) {
     let mut world = World::new();
     let beam = |x: f32| Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.1)).total_mass(10.0).position(x, 0.0, 0.0);
-    let (near, far) = (world.add(beam(0.5)), world.add(beam(1.5)));
+    let (near, far) = (world.insert(beam(0.5)), world.insert(beam(1.5)));
     let end = 0.5 * Vec3::X;
-    world.join(Joint::to_world(near, -end, Vec3::ZERO).fixed());
-    world.join(Joint::new(far, -end, near, end).fixed());
+    world.insert_joint(Joint::to_world(near, -end, Vec3::ZERO).fixed());
+    world.insert_joint(Joint::new(far, -end, near, end).fixed());
     let mut simulation = simulate(world, open);
     steps(&mut simulation, 3.0, |_, _| {});
     for (body, place) in [(near, 0.5), (far, 1.5)] {
@@ -278,7 +278,7 @@ fn a_fixed_cantilever_keeps_its_angle(open: Open) {
 fn a_turning_spring_bears_a_load_at_the_angle_that_its_stiffness_says(open: Open) {
     let (frequency, inertia) = (3.0, 2.0 * ((1.0 + 0.04_f32.powi(2)) / 12.0 + 0.25));
     let (mut world, hinge) = hung_rod(FRAC_PI_2, 0.0);
-    world.join(hinge.spring(FRAC_PI_2, frequency, 1.0));
+    world.insert_joint(hinge.spring(FRAC_PI_2, frequency, 1.0));
     let mut simulation = simulate(world, open);
     steps(&mut simulation, 3.0, |_, _| {});
     // Alone the spring sees the inertia of the rod about its center, and the ball joint adds the rest: see the effective mass of an axis.
@@ -294,10 +294,10 @@ fn a_generic_joint_moves_as_the_kind_that_it_describes(open: Open) {
     let mut carts = Vec::new();
     for z in 0..2 {
         let at = Vec3::new(0.0, 0.0, 3.0 * z as f32);
-        let cart = world.add(Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)).position(at.x, at.y, at.z));
+        let cart = world.insert(Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)).position(at.x, at.y, at.z));
         let joint = Joint::to_world(cart, Vec3::ZERO, at);
         let fall = Axis::limited(-1.0, 5.0);
-        world.join(match z {
+        world.insert_joint(match z {
             0 => joint.slider(Vec3::Y).limited(-1.0, 5.0),
             _ => joint.generic([Axis::LOCKED, fall, Axis::LOCKED], [Axis::LOCKED; 3]),
         });
@@ -315,11 +315,11 @@ fn a_generic_joint_moves_as_the_kind_that_it_describes(open: Open) {
 fn bodies_on_a_sliding_joint_keep_their_momentum(open: Open) {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    let a = world.add(Body::dynamic().shape(Shape::cuboid(0.4, 0.1, 0.1)).position(0.2, 0.5, 0.0));
-    let b = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.3)));
+    let a = world.insert(Body::dynamic().shape(Shape::cuboid(0.4, 0.1, 0.1)).position(0.2, 0.5, 0.0));
+    let b = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.3)));
     world.bodies[a].linear_velocity = Vec3::new(0.6, 0.0, 0.4);
     world.bodies[b].angular_velocity = Vec3::new(0.0, 0.5, 1.0);
-    world.join(Joint::new(a, Vec3::ZERO, b, 0.5 * Vec3::Y).slider(Vec3::X));
+    world.insert_joint(Joint::new(a, Vec3::ZERO, b, 0.5 * Vec3::Y).slider(Vec3::X));
     let (linear, angular) = (world.linear_momentum(), world.angular_momentum());
     let mut simulation = simulate(world, open);
     let mut first = None;
@@ -341,10 +341,10 @@ fn a_bead_on_a_turning_rod_flies_out_as_a_hyperbolic_cosine(open: Open) {
     const BEGIN: f32 = 0.5;
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     let bead = Body::dynamic().shape(Shape::ball(0.05)).position(BEGIN, 0.0, 0.0);
-    let bead = world.add(bead.velocity(Vec3::NEG_Z * SPIN * BEGIN, Vec3::Y * SPIN));
+    let bead = world.insert(bead.velocity(Vec3::NEG_Z * SPIN * BEGIN, Vec3::Y * SPIN));
     let rod = Body::kinematic().shape(Shape::cuboid(3.0, 0.01, 0.01));
-    let rod = world.add(rod.velocity(Vec3::ZERO, Vec3::Y * SPIN));
-    world.join(Joint::new(bead, Vec3::ZERO, rod, Vec3::ZERO).slider(Vec3::X));
+    let rod = world.insert(rod.velocity(Vec3::ZERO, Vec3::Y * SPIN));
+    world.insert_joint(Joint::new(bead, Vec3::ZERO, rod, Vec3::ZERO).slider(Vec3::X));
     let mut simulation = simulate(world, open);
     let mut worst = 0.0_f32;
     steps(&mut simulation, 0.075, |time, world| {
@@ -361,7 +361,7 @@ fn impulses_of_axes_follow_their_joint_and_its_substeps() {
     let mut joints = Vec::new();
     for z in [0.0, 2.0] {
         let rod = Body::dynamic().shape(Shape::cuboid(0.5, 0.02, 0.02)).total_mass(2.0).position(0.5, 0.0, z);
-        let rod = world.add(rod);
+        let rod = world.insert(rod);
         let hinge = Joint::to_world(rod, -0.5 * Vec3::X, z * Vec3::Z).hinge(Vec3::Z);
         joints.push(world.insert_joint(hinge.limited(0.0, 1.0)));
     }
@@ -394,13 +394,13 @@ fn driven(is_hinge: bool, drives: &[&dyn Fn(Joint) -> Joint], open: Open) -> Sim
         let apart = Vec3::Z * (2.0 * i as f32);
         let body = Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1));
         let joint = if is_hinge {
-            let rod = world.add(body.density(1.0).position(0.0, 0.5, apart.z));
+            let rod = world.insert(body.density(1.0).position(0.0, 0.5, apart.z));
             Joint::to_world(rod, Vec3::Y * -0.5, apart).hinge(Vec3::Z)
         } else {
-            let sled = world.add(body.total_mass(1.0).position(0.0, 0.0, apart.z));
+            let sled = world.insert(body.total_mass(1.0).position(0.0, 0.0, apart.z));
             Joint::to_world(sled, Vec3::ZERO, apart).slider(Vec3::X)
         };
-        world.join(drive(joint));
+        world.insert_joint(drive(joint));
     }
     simulate(world, open)
 }
@@ -436,9 +436,9 @@ fn a_spring_past_pi_pulls_back_the_shorter_way(open: Open) {
     for (i, target) in targets.into_iter().enumerate() {
         let apart = Vec3::X * (2.0 * i as f32);
         let body = Body::dynamic().density(1.0).shape(Shape::cuboid(0.1, 0.5, 0.1));
-        let body = world.add(body.position(apart.x, 0.0, 0.0));
+        let body = world.insert(body.position(apart.x, 0.0, 0.0));
         let angular = [Axis::FREE.spring(target, 5.0, 0.2, f32::MAX), Axis::LOCKED, Axis::LOCKED];
-        world.join(Joint::to_world(body, Vec3::ZERO, apart).generic([Axis::LOCKED; 3], angular));
+        world.insert_joint(Joint::to_world(body, Vec3::ZERO, apart).generic([Axis::LOCKED; 3], angular));
     }
     let mut simulation = simulate(world, open);
     steps(&mut simulation, 4.0, |_, _| {});
@@ -457,8 +457,8 @@ fn a_limit_stands_where_it_is_however_far_the_other_one_is(open: Open) {
         let apart = Vec3::Z * (2.0 * i as f32);
         let towards = if max == 5.0 { 3.0 } else { -3.0 };
         let ball = Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X * towards, Vec3::ZERO);
-        let ball = world.add(ball.position(0.0, 0.0, apart.z));
-        world.join(Joint::to_world(ball, Vec3::ZERO, apart).slider(Vec3::X).limited(min, max));
+        let ball = world.insert(ball.position(0.0, 0.0, apart.z));
+        world.insert_joint(Joint::to_world(ball, Vec3::ZERO, apart).slider(Vec3::X).limited(min, max));
     }
     let mut simulation = simulate(world, open);
     steps(&mut simulation, 3.0, |_, _| {});
@@ -483,17 +483,17 @@ fn a_joint_whose_axes_are_all_free_holds_nothing(open: Open) {
         let ball = |x: f32, v: f32| {
             Body::dynamic().shape(Shape::ball(0.5)).position(x, 0.0, 0.0).velocity(Vec3::X * v, Vec3::ZERO)
         };
-        let [a, b] = [(-1.0, 1.0), (1.0, -1.0)].map(|(x, v)| world.add(ball(x, v)));
+        let [a, b] = [(-1.0, 1.0), (1.0, -1.0)].map(|(x, v)| world.insert(ball(x, v)));
         let free = |joint: Joint| match is_distance {
             true => joint.at_distance(Axis::FREE),
             false => joint.generic([Axis::FREE; 3], [Axis::FREE; 3]),
         };
         let pair = free(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO));
-        world.join(if collide { pair.colliding() } else { pair });
-        world.join(free(Joint::to_world(a, Vec3::ZERO, Vec3::ZERO)));
+        world.insert_joint(if collide { pair.colliding() } else { pair });
+        world.insert_joint(free(Joint::to_world(a, Vec3::ZERO, Vec3::ZERO)));
         if with_axes {
-            let c = world.add(ball(9.0, 0.0));
-            world.join(Joint::to_world(c, Vec3::ZERO, Vec3::X * 9.0).hinge(Vec3::Z));
+            let c = world.insert(ball(9.0, 0.0));
+            world.insert_joint(Joint::to_world(c, Vec3::ZERO, Vec3::X * 9.0).hinge(Vec3::Z));
         }
         let mut simulation = simulate(world, open);
         let mut rows = 0;
@@ -512,8 +512,8 @@ fn a_joint_whose_axes_are_all_free_holds_nothing(open: Open) {
 /// A drum on a hinge that a motor turns at 9 rad/s.
 fn drum(limits: [f32; 2], speed: f32) -> World {
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-    let drum = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).total_mass(3.0));
-    world.join(
+    let drum = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).total_mass(3.0));
+    world.insert_joint(
         Joint::to_world(drum, Vec3::ZERO, Vec3::ZERO).hinge(Vec3::Y).limited(limits[0], limits[1]).motor(speed, 20.0),
     );
     world

@@ -28,8 +28,8 @@ fn rod_period(dt: f32, open: Open) -> f64 {
     let turn = Quat::from_rotation_z(angle);
     let rod = Body::dynamic().shape(Shape::cuboid(0.01, 0.5, 0.01)).rotation(turn);
     let center = turn * Vec3::new(0.0, -0.5, 0.0);
-    let rod = world.add(rod.position(center.x, center.y, center.z));
-    world.join(Joint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    let rod = world.insert(rod.position(center.x, center.y, center.z));
+    world.insert_joint(Joint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
     let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);
     let (mut crossings, mut before) = (Vec::new(), center.x);
     for step in 1.. {
@@ -63,11 +63,11 @@ fn every_joint_of_a_hanging_chain_carries_what_hangs_on_it(open: Open) {
     for i in 0..links {
         let mass = if i + 1 == links { 50.0 } else { 1.0 };
         let link = Body::dynamic().shape(Shape::cuboid(0.05, 0.25, 0.05)).total_mass(mass);
-        let link = world.add(link.position(0.0, -0.25 - 0.5 * i as f32, 0.0));
+        let link = world.insert(link.position(0.0, -0.25 - 0.5 * i as f32, 0.0));
         let top = Vec3::new(0.0, 0.25, 0.0);
         match above {
-            None => world.join(Joint::to_world(link, top, Vec3::ZERO)),
-            Some(a) => world.join(Joint::new(a, -top, link, top)),
+            None => world.insert_joint(Joint::to_world(link, top, Vec3::ZERO)),
+            Some(a) => world.insert_joint(Joint::new(a, -top, link, top)),
         };
         above = Some(link);
     }
@@ -97,11 +97,11 @@ fn tied_bodies_pass_through_each_other_unless_asked_not_to(open: Open) {
         let mut world = World::new();
         world.gravity = Vec3::ZERO;
         let cube = || Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
-        let a = world.add(cube());
-        let b = world.add(cube().position(0.9, 0.0, 0.0));
+        let a = world.insert(cube());
+        let b = world.insert(cube().position(0.9, 0.0, 0.0));
         let mut joint = Joint::new(a, Vec3::new(0.45, 0.0, 0.0), b, Vec3::new(-0.45, 0.0, 0.0));
         joint.collide = collide;
-        world.join(joint);
+        world.insert_joint(joint);
         let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);
         let stats = simulation.step(1.0 / 60.0).unwrap();
         stats.manifolds
@@ -112,8 +112,8 @@ fn tied_bodies_pass_through_each_other_unless_asked_not_to(open: Open) {
 
 fn a_kinematic_board_reaches_the_pose_that_it_is_sent_to(open: Open) {
     let mut world = World::new();
-    let board = world.add(Body::kinematic().shape(Shape::cuboid(1.0, 0.1, 1.0)));
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.2)).position(0.0, 0.3, 0.0));
+    let board = world.insert(Body::kinematic().shape(Shape::cuboid(1.0, 0.1, 1.0)));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(0.0, 0.3, 0.0));
     let mut simulation = simulate(world, SolverConfig::default().without_sleep(), open);
     let target = Quat::from_rotation_z(0.2);
     for step in 1..=60 {

@@ -53,7 +53,7 @@ fn cube(x: f32, y: f32) -> Body {
 /// Towers of five cubes, 3 m apart; the handles of their cubes from below.
 fn towers(count: usize) -> (World, Vec<Vec<BodyHandle>>) {
     let mut world = World::new();
-    world.add(ground());
+    world.insert(ground());
     let tower = |k: usize| {
         (0..5).map(move |level| cube(3.0 * k as f32, 0.5 + level as f32).velocity(1e-9 * Vec3::NEG_Y, Vec3::ZERO))
     };
@@ -101,7 +101,7 @@ fn a_body_that_comes_lands_and_rests_on_what_sleeps(open: Open) {
     let landed = simulation.world.body(new).expect("the cube").position;
     assert!((landed.y - 5.5).abs() < 2e-3 && landed.x.abs() < 0.02, "{landed}");
     assert!(simulation.is_asleep(new.index()));
-    assert!(simulation.manifolds().any(|m| [m.body_a, m.body_b].contains(&new.index())));
+    assert!(simulation.manifolds().any(|m| [m.a.body, m.b.body].contains(&new)));
 }
 
 /// The vacancy is filled at once: the new body begins without contacts and impulses of the one before.
@@ -117,7 +117,7 @@ fn a_body_in_the_place_of_another_is_another_body(open: Open) {
     run(&mut simulation, 1);
     let body = simulation.world.body(new).expect("the cube");
     assert!((body.linear_velocity.y + 9.81 * DT).abs() < 1e-5, "{}", body.linear_velocity);
-    assert!(simulation.manifolds().all(|m| ![m.body_a, m.body_b].contains(&new.index())));
+    assert!(simulation.manifolds().all(|m| ![m.a.body, m.b.body].contains(&new)));
     run(&mut simulation, 240);
     assert!((simulation.world.body(new).expect("the cube").position.y - 0.5).abs() < 2e-3);
     assert!((simulation.world.body(towers[0][3]).expect("a cube").position.y - 3.5).abs() < 2e-3);
@@ -143,8 +143,8 @@ fn a_twin_in_the_place_of_a_body_begins_without_its_impulses(open: Open) {
 /// Two fixed bodies make no pair, so that detection has to look again.
 fn a_fixed_body_that_becomes_dynamic_lands_on_fixed_ground(open: Open) {
     let mut world = World::new();
-    world.add(ground());
-    let low = world.add(cube(0.0, 0.5));
+    world.insert(ground());
+    let low = world.insert(cube(0.0, 0.5));
     world.bodies[low].kind = BodyKind::Fixed;
     let mut simulation = simulation(&world, &SolverConfig::default(), open);
     run(&mut simulation, 10);
@@ -157,7 +157,7 @@ fn a_fixed_body_that_becomes_dynamic_lands_on_fixed_ground(open: Open) {
 fn ground_without_bounds_that_goes_bears_nothing_more(open: Open) {
     let mut world = World::new();
     let plane = world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let low = world.add(cube(0.0, 0.5));
+    let low = world.insert(cube(0.0, 0.5));
     let mut simulation = simulation(&world, &SolverConfig::default(), open);
     run(&mut simulation, 60);
     simulation.world.remove(plane);
@@ -229,7 +229,7 @@ fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse(op
     let link = |y: f32| Body::dynamic().shape(Shape::cuboid(0.1, 0.25, 0.1)).position(0.0, y, 0.0);
     let end = 0.25 * Vec3::Y;
     let links: Vec<_> = (0..4).map(|k| world.insert(link(-0.25 - 0.5 * k as f32))).collect();
-    world.join(Joint::to_world(links[0], end, Vec3::ZERO));
+    world.insert_joint(Joint::to_world(links[0], end, Vec3::ZERO));
     let joints: Vec<_> = links.windows(2).map(|w| world.insert_joint(Joint::new(w[0], -end, w[1], end))).collect();
     let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), open);
     run(&mut simulation, 120);
@@ -241,7 +241,7 @@ fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse(op
     // Two links of four are left on the first joint.
     assert!((simulation.joint_impulses()[0].y / weight - 0.5).abs() < 0.01);
     let new = simulation.world.insert(link(-1.25));
-    simulation.world.join(Joint::new(links[1], -end, new, end));
+    simulation.world.insert_joint(Joint::new(links[1], -end, new, end));
     run(&mut simulation, 120);
     assert!((simulation.joint_impulses()[0].y / weight - 0.75).abs() < 0.01);
     assert!(simulation.world.joint_gap() < 1e-3);
@@ -250,7 +250,7 @@ fn a_joint_goes_with_its_body_and_another_in_its_place_begins_without_impulse(op
 /// A brick is taken out and put back every tenth step: the pyramid stands, because all other contacts keep their impulses.
 fn a_pyramid_of_which_bricks_are_replaced_stands() {
     let mut world = World::new();
-    world.add(ground());
+    world.insert(ground());
     let rows = 10;
     let brick = |row: usize, k: usize| {
         let x = k as f32 + 0.5 * row as f32;
@@ -276,7 +276,7 @@ fn a_pyramid_of_which_bricks_are_replaced_stands() {
 /// Places are used again, so that nothing grows.
 fn a_world_in_which_bodies_come_and_go_for_long_does_not_grow() {
     let mut world = World::new();
-    world.add(ground());
+    world.insert(ground());
     let mut simulation = simulation(&world, &SolverConfig::default(), cpu);
     let mut rain = std::collections::VecDeque::new();
     let mut most = [0; 2];
@@ -336,7 +336,7 @@ fn what_comes_and_goes_has_the_same_bits_everywhere() {
                 3 => world.body_mut(chosen).expect("a cube").kind = BodyKind::Fixed,
                 4 => {
                     let at = world.bodies[chosen.index()].position;
-                    world.join(Joint::to_world(chosen, Vec3::ZERO, at + 0.1 * Vec3::X));
+                    world.insert_joint(Joint::to_world(chosen, Vec3::ZERO, at + 0.1 * Vec3::X));
                 }
                 _ => world.body_mut(chosen).expect("a cube").groups = Groups { membership: 2, filter: 3 },
             }
@@ -377,7 +377,7 @@ fn settings_change_after_a_contact_ended(open: Open) {
 /// A body that moved and became fixed keeps the numbers of its velocity, and they mean nothing.
 fn a_fixed_body_with_a_velocity_is_as_one_without(open: Open) {
     let mut world = World::new();
-    world.add(ground());
+    world.insert(ground());
     // The cube passes by the corner of the fixed one.
     let fixed = world.insert(cube(0.0, 1.2).rotation(Quat::from_rotation_z(0.6)));
     let passing = world.insert(cube(-1.45, 3.0).velocity(Vec3::new(0.1, 0.0, 0.0), Vec3::splat(0.5)));

@@ -88,22 +88,22 @@ fn body(random: &mut Random) -> Body {
 fn room() -> World {
     let mut world = World::new();
     let own = Groups { membership: ROOM_GROUP, filter: u32::MAX };
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).groups(own));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).groups(own));
     for out in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z] {
         let at = ROOM * out;
-        world.add(Body::fixed().shape(Shape::half_space(-out)).position(at.x, at.y, at.z).groups(own));
+        world.insert(Body::fixed().shape(Shape::half_space(-out)).position(at.x, at.y, at.z).groups(own));
     }
     // The borders of surfaces are in the floor and beyond the walls: a surface has one side, and nothing is to get behind it.
     let height =
         |i: usize, j: usize| if [i, j].iter().any(|k| k % 4 == 0) { -0.3 } else { 0.1 * ((3 * i + 5 * j) % 4) as f32 };
     let heights: Vec<Vec<f32>> = (0..5).map(|i| (0..5).map(|j| height(i, j)).collect()).collect();
     let field = Shape::height_field(&heights, Vec3::new(3.0, 1.0, 3.0)).expect("a field");
-    world.add(Body::fixed().shape(field).position(-2.0, 0.0, -2.0).groups(own));
+    world.insert(Body::fixed().shape(field).position(-2.0, 0.0, -2.0).groups(own));
     let side = ROOM + 1.0;
     let corners =
         [(0.0, -0.3, -side), (0.0, -0.3, side), (side, 1.2, -side), (side, 1.2, side)].map(Vec3::from).to_vec();
     let ramp = Shape::mesh(corners, vec![[0, 1, 2], [2, 1, 3]]).expect("a mesh");
-    world.add(Body::fixed().shape(ramp).groups(own));
+    world.insert(Body::fixed().shape(ramp).groups(own));
     world
 }
 
@@ -294,7 +294,7 @@ impl Run {
 
     /// The world has what the model has, and nothing else.
     fn check(&mut self) {
-        let manifolds: Vec<_> = self.simulation.manifolds().map(|m| [m.body_a, m.body_b]).collect();
+        let manifolds: Vec<_> = self.simulation.manifolds().map(|m| [m.a.body, m.b.body]).collect();
         let Model { bodies, joints, gone, gone_joints } = &self.model;
         let world = &self.simulation.world;
         assert!(world.bodies.handles().eq(bodies.keys().copied()), "after {} calls", self.calls);
@@ -311,7 +311,7 @@ impl Run {
         }
         assert!(gone_joints.iter().all(|&handle| world.joint(handle).is_none()));
         for [a, b] in manifolds {
-            let [a, b] = [a, b].map(|body| bodies[&world.bodies.handle(body).expect("a body")].clone());
+            let [a, b] = [a, b].map(|body| bodies[&body].clone());
             assert!(a.world == b.world && a.groups.meets(b.groups), "{a:?} touches {b:?}");
         }
     }

@@ -58,17 +58,17 @@ fn after(world: World, substeps: u32, steps: u32, open: Open) -> World {
 /// Boards that fall on an edge, balls that hit them beside their middle, and a pendulum, with the axes of each locked that `axes` gives.
 fn mixture(axes: impl Fn(usize) -> [bool; 3]) -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     let turn = Quat::from_scaled_axis(Vec3::new(0.4, -0.9, 0.3));
     for k in 0..4 {
         let board = Body::dynamic().shape(Shape::cuboid(0.6, 0.1, 0.3)).rotation(turn);
-        world.add(board.position(3.0 * k as f32, 1.2, 0.0).velocity(Vec3::X, Vec3::new(1.0, 2.0, -3.0)));
+        world.insert(board.position(3.0 * k as f32, 1.2, 0.0).velocity(Vec3::X, Vec3::new(1.0, 2.0, -3.0)));
         let ball = Body::dynamic().shape(Shape::ball(0.2)).position(3.0 * k as f32 + 0.4, 2.5, 0.1);
-        world.add(ball.velocity(Vec3::Y * -3.0, Vec3::ZERO));
+        world.insert(ball.velocity(Vec3::Y * -3.0, Vec3::ZERO));
     }
     let bob = Body::dynamic().shape(Shape::cuboid(0.3, 0.1, 0.2)).position(-3.0, 3.0, 0.0).rotation(turn);
-    let bob = world.add(bob.velocity(Vec3::Z * 2.0, Vec3::Y));
-    world.join(Joint::to_world(bob, Vec3::Y, Vec3::new(-3.0, 4.0, 0.0)));
+    let bob = world.insert(bob.velocity(Vec3::Z * 2.0, Vec3::Y));
+    world.insert_joint(Joint::to_world(bob, Vec3::Y, Vec3::new(-3.0, 4.0, 0.0)));
     (0..world.bodies.len()).for_each(|k| world.bodies[k].locked_rotations = axes(k));
     world
 }
@@ -89,11 +89,11 @@ fn a_body_with_locked_rotations_never_turns(open: Open) {
 
 fn bodies_of_a_plane_turn_about_its_normal_only(open: Open) {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for k in 0..8 {
         // Hits out of the plane, and edges that tip.
         let body = cube().position(0.4 * (k % 3) as f32, 0.9 + 1.3 * k as f32, 0.05 * k as f32);
-        world.add(body.rotation(Quat::from_rotation_z(0.3 * k as f32)).locked_rotations([true, true, false]));
+        world.insert(body.rotation(Quat::from_rotation_z(0.3 * k as f32)).locked_rotations([true, true, false]));
     }
     let world = after(world, 8, 120, open);
     let mut turned = 0.0_f32;
@@ -114,7 +114,7 @@ fn a_board_turns_about_the_free_axis_as_on_bearings(open: Open) {
     for (k, free) in Vec3::AXES.into_iter().enumerate() {
         let mut world = weightless();
         let axes = [0, 1, 2].map(|axis| axis != k);
-        world.add(Body::dynamic().mass_properties(mass).rotation(rotation).locked_rotations(axes));
+        world.insert(Body::dynamic().mass_properties(mass).rotation(rotation).locked_rotations(axes));
         world.bodies[0].torque = Vec3::new(2.0, -3.0, 1.5);
         let moment = free.dot(Mat3::from_quat(rotation) * (inertia * (rotation.inverse() * free)));
         let wanted = free * (0.5 * world.bodies[0].torque.dot(free) / moment);
@@ -129,9 +129,9 @@ fn a_board_turns_about_the_free_axis_as_on_bearings(open: Open) {
 /// A ball without friction that hits a locked cube beside its center, without restitution: both go on with m v/(m + M).
 fn a_hit_beside_the_center_of_a_locked_body_is_a_central_one(open: Open) {
     let mut world = weightless();
-    world.add(cube().locked_rotations([true; 3]).friction(0.0));
+    world.insert(cube().locked_rotations([true; 3]).friction(0.0));
     let ball = Body::dynamic().shape(Shape::ball(0.2)).total_mass(2.0).friction(0.0).position(-1.0, 0.4, 0.3);
-    world.add(ball.velocity(Vec3::X * 4.0, Vec3::ZERO));
+    world.insert(ball.velocity(Vec3::X * 4.0, Vec3::ZERO));
     let world = after(world, 8, 60, open);
     for body in &world.bodies {
         let v = body.linear_velocity;
@@ -166,9 +166,9 @@ fn free_axes_keep_their_momentum() {
     let meet = |axes: [bool; 3]| {
         let mut world = weightless();
         // A cube and a ball that meet beside their centers, in a plane across z; friction takes steps by the inertia about all axes.
-        world.add(cube().locked_rotations(axes).restitution(0.5).friction(0.0));
+        world.insert(cube().locked_rotations(axes).restitution(0.5).friction(0.0));
         let ball = Body::dynamic().shape(Shape::ball(0.3)).total_mass(2.0).position(-1.5, 0.4, 0.0).restitution(0.5);
-        world.add(ball.friction(0.0).velocity(Vec3::X * 3.0, Vec3::Z).locked_rotations(axes));
+        world.insert(ball.friction(0.0).velocity(Vec3::X * 3.0, Vec3::Z).locked_rotations(axes));
         after(world, 8, 60, reference)
     };
     let [free, locked] = [[false; 3], [true, true, false]].map(meet);
@@ -186,7 +186,7 @@ fn free_axes_keep_their_momentum() {
 
 fn axes_that_a_caller_locks_stop_in_the_next_step() {
     let mut world = weightless();
-    world.add(cube().velocity(Vec3::X, Vec3::new(1.0, 2.0, 3.0)));
+    world.insert(cube().velocity(Vec3::X, Vec3::new(1.0, 2.0, 3.0)));
     let mut simulation = simulation(world, 8, reference);
     simulation.step(DT).expect("a step");
     simulation.world.bodies[0].locked_rotations = [true, false, true];
@@ -217,7 +217,7 @@ fn the_inertia_of_a_locked_body_turns_with_no_joint() {
 
 fn a_contact_problem_of_locked_bodies_is_refused_by_name() {
     let mut world = World::new();
-    world.add(cube().named("crate").locked_rotations([false, true, false]));
+    world.insert(cube().named("crate").locked_rotations([false, true, false]));
     let error = drystone_problems::step_with_contacts(&mut simulation(world, 8, reference), "one", DT)
         .map(|_| ())
         .expect_err("a lock")
@@ -228,20 +228,20 @@ fn a_contact_problem_of_locked_bodies_is_refused_by_name() {
 /// A pile of boxes and chains between them, all in the plane of x and y, pushed out of it.
 fn plane(joints: bool) -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::new(0.0, 1.0, 0.2).normalize())));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::new(0.0, 1.0, 0.2).normalize())));
     for k in 0..12 {
         let at = [1.5 * (k % 4) as f32, 0.8 + 1.6 * (k / 4) as f32, 0.02 * k as f32];
         let body = if k % 3 == 0 { Body::dynamic().shape(Shape::ball(0.4)) } else { cube() };
         let body = body.position(at[0], at[1], at[2]).rotation(Quat::from_rotation_z(0.2 * k as f32));
         let body = body.locked_translations([false, false, true]).locked_rotations([true, true, false]);
-        world.add(body.velocity(Vec3::new(1.0, -1.0, 2.0), Vec3::ONE));
+        world.insert(body.velocity(Vec3::new(1.0, -1.0, 2.0), Vec3::ONE));
     }
     if joints {
         for (a, b) in [(11, 12), (10, 11)] {
             let [body_a, body_b] = [a, b].map(|i: usize| &world.bodies[i]);
             let middle = body_a.position.midpoint(body_b.position);
             let [on_a, on_b] = [body_a, body_b].map(|body| body.rotation.inverse() * (middle - body.position));
-            world.join(Joint::new(a, on_a, b, on_b));
+            world.insert_joint(Joint::new(a, on_a, b, on_b));
         }
     }
     world
@@ -265,9 +265,10 @@ fn a_body_with_locked_translations_stays_in_its_plane(open: Open) {
 fn contacts_bear_on_a_locked_body_as_on_a_fixed_one(open: Open) {
     let mut world = World::new();
     let board = Body::dynamic().shape(Shape::cuboid(2.0, 0.1, 0.5)).total_mass(1.0).position(0.0, 1.0, 0.0);
-    let board = world.add(board.locked_translations([true; 3]).locked_rotations([true; 3]));
-    let crates = [-1.5, 1.5]
-        .map(|x| world.add(Body::dynamic().shape(Shape::cuboid(0.3, 0.3, 0.3)).total_mass(20.0).position(x, 1.5, 0.0)));
+    let board = world.insert(board.locked_translations([true; 3]).locked_rotations([true; 3]));
+    let crates = [-1.5, 1.5].map(|x| {
+        world.insert(Body::dynamic().shape(Shape::cuboid(0.3, 0.3, 0.3)).total_mass(20.0).position(x, 1.5, 0.0))
+    });
     let mut simulation = simulation(world, 8, open);
     let mut lowest = f32::INFINITY;
     for _ in 0..120 {
@@ -289,13 +290,13 @@ fn a_cart_on_a_rail_and_its_pendulum_swing_as_on_paper(open: Open) {
     for (mass, solver) in [1.0, 1000.0].into_iter().flat_map(|m| [(m, JointSolver::Sweeps), (m, JointSolver::Direct)]) {
         let mut world = World::new();
         let rail = cube().total_mass(1.0).locked_translations([false, true, true]).locked_rotations([true; 3]);
-        let cart = world.add(rail);
+        let cart = world.insert(rail);
         // A small swing: the bob also rises, with 1000 times the mass of the cart.
         let swing = Quat::from_rotation_z(2e-3);
         let at = swing * Vec3::NEG_Y;
         let bob = Body::dynamic().shape(Shape::ball(0.05)).total_mass(mass).position(at.x, at.y, 0.0).rotation(swing);
-        let bob = world.add(bob);
-        world.join(Joint::new(bob, Vec3::Y, cart, Vec3::ZERO));
+        let bob = world.insert(bob);
+        world.insert_joint(Joint::new(bob, Vec3::Y, cart, Vec3::ZERO));
         // Their common center of mass stays.
         let share = mass / (1.0 + mass);
         world.bodies[cart].position.x = -share * at.x;
@@ -323,13 +324,13 @@ fn axes_of_joints_bear_on_a_locked_body_as_on_a_fixed_one(open: Open) {
     for solver in [JointSolver::Sweeps, JointSolver::Direct] {
         let mut world = World::new();
         let rail = cube().total_mass(1.0).locked_translations([false, true, true]).locked_rotations([true; 3]);
-        let [weld, spring] = [0.0, 4.0].map(|x| world.add(rail.clone().position(x, 0.0, 0.0)));
+        let [weld, spring] = [0.0, 4.0].map(|x| world.insert(rail.clone().position(x, 0.0, 0.0)));
         let load = |x: f32| cube().total_mass(1000.0).position(x, -2.0, 0.0);
-        let [welded, sprung] = [0.0, 4.0].map(|x| world.add(load(x)));
-        world.join(Joint::new(welded, Vec3::Y * 2.0, weld, Vec3::ZERO).fixed());
+        let [welded, sprung] = [0.0, 4.0].map(|x| world.insert(load(x)));
+        world.insert_joint(Joint::new(welded, Vec3::Y * 2.0, weld, Vec3::ZERO).fixed());
         let stiffness = 1000.0 * 9.81 / 0.1;
         let axis = Joint::new(sprung, Vec3::Y * 2.0, spring, Vec3::ZERO).slider(Vec3::Y);
-        world.join(axis.spring_damper(0.0, stiffness, 2.0 * (stiffness * 1000.0).sqrt()));
+        world.insert_joint(axis.spring_damper(0.0, stiffness, 2.0 * (stiffness * 1000.0).sqrt()));
         let config = SolverConfig::default().without_sleep().with(|c| c.joint_solver = solver);
         let mut simulation = Simulation::with(world, config, open()).expect("a simulation");
         let mut sunk = 0.0_f32;
@@ -344,8 +345,8 @@ fn axes_of_joints_bear_on_a_locked_body_as_on_a_fixed_one(open: Open) {
 
 fn no_body_ends_a_step_faster_than_its_largest_speeds(open: Open) {
     let mut world = weightless();
-    let fast = world.add(cube().velocity(Vec3::new(30.0, 40.0, 0.0), Vec3::Y * 20.0).max_speeds(10.0, 2.0));
-    let falls = world.add(cube().position(20.0, 0.0, 0.0).max_speeds(5.0, f32::INFINITY));
+    let fast = world.insert(cube().velocity(Vec3::new(30.0, 40.0, 0.0), Vec3::Y * 20.0).max_speeds(10.0, 2.0));
+    let falls = world.insert(cube().position(20.0, 0.0, 0.0).max_speeds(5.0, f32::INFINITY));
     world.bodies[falls].force = Vec3::X * 60.0;
     let mut simulation = Simulation::with(world, SolverConfig::default(), open()).expect("a simulation");
     for step in 1..=60 {
@@ -395,9 +396,9 @@ fn the_law_of_energy_holds_bodies_with_locked_axes() {
     let mut world = weightless();
     for k in 0..2 {
         let body = cube().position(0.9 * k as f32, 0.0, 0.0).locked_translations([false, true, true]);
-        world.add(body.velocity(Vec3::X * (3.0 - 6.0 * k as f32), Vec3::new(0.0, 5.0, -8.0)));
+        world.insert(body.velocity(Vec3::X * (3.0 - 6.0 * k as f32), Vec3::new(0.0, 5.0, -8.0)));
     }
-    world.join(Joint::new(0, Vec3::X * 0.45, 1, Vec3::X * -0.45).colliding());
+    world.insert_joint(Joint::new(0, Vec3::X * 0.45, 1, Vec3::X * -0.45).colliding());
     let energy = |world: &World| world.bodies.iter().map(Body::kinetic_energy).sum::<f64>();
     let before = energy(&world);
     let mut simulation = Simulation::with(world, SolverConfig::default(), reference()).expect("a simulation");

@@ -36,8 +36,8 @@ fn pendulums(angle: f32) -> World {
         let turn = Quat::from_rotation_z(angle);
         let center = pivot - turn * Vec3::Y;
         let ball = Body::dynamic().shape(Shape::ball(0.1)).total_mass(mass).rotation(turn);
-        let ball = world.add(ball.position(center.x, center.y, center.z));
-        world.join(Joint::to_world(ball, Vec3::Y, pivot));
+        let ball = world.insert(ball.position(center.x, center.y, center.z));
+        world.insert_joint(Joint::to_world(ball, Vec3::Y, pivot));
     }
     world
 }
@@ -78,10 +78,10 @@ fn a_light_ball_hangs_on_a_heavy_one(open: Open) {
     for (k, masses) in pairs.into_iter().enumerate() {
         let [upper, lower] = [0, 1].map(|i| {
             let ball = Body::dynamic().shape(Shape::ball(0.2)).total_mass(masses[i]);
-            world.add(ball.position(5.0 * k as f32, -0.5 - i as f32, 0.0))
+            world.insert(ball.position(5.0 * k as f32, -0.5 - i as f32, 0.0))
         });
-        world.join(Joint::to_world(upper, 0.5 * Vec3::Y, 5.0 * k as f32 * Vec3::X));
-        world.join(Joint::new(upper, -0.5 * Vec3::Y, lower, 0.5 * Vec3::Y));
+        world.insert_joint(Joint::to_world(upper, 0.5 * Vec3::Y, 5.0 * k as f32 * Vec3::X));
+        world.insert_joint(Joint::new(upper, -0.5 * Vec3::Y, lower, 0.5 * Vec3::Y));
     }
     let config = SolverConfig::default().with(|c| c.joint_solver = JointSolver::Sweeps);
     let substep = 1.0 / 60.0 / f64::from(config.substeps as f32);
@@ -109,8 +109,8 @@ fn small_balls_swing_at_the_end_of_long_arms(open: Open) {
         let turn = Quat::from_rotation_z(0.7);
         let center = -(turn * Vec3::Y);
         let ball = Body::dynamic().shape(Shape::ball(radius)).total_mass(1.0).rotation(turn);
-        let ball = world.add(ball.position(center.x, center.y, center.z));
-        world.join(Joint::to_world(ball, Vec3::Y, Vec3::ZERO));
+        let ball = world.insert(ball.position(center.x, center.y, center.z));
+        world.insert_joint(Joint::to_world(ball, Vec3::Y, Vec3::ZERO));
         let energy = |world: &World| world.kinetic_energy() + world.potential_energy();
         let before = energy(&world);
         let mut simulation = simulate(world, SolverConfig::default(), open);
@@ -128,12 +128,12 @@ fn small_balls_swing_at_the_end_of_long_arms(open: Open) {
 
 fn a_joint_of_bodies_that_nothing_moves_carries_nothing(open: Open) {
     let mut world = World::new();
-    let board = world.add(Body::kinematic().shape(Shape::ball(0.5)));
-    let wall = world.add(Body::fixed().shape(Shape::ball(0.5)).position(3.0, 0.0, 0.0));
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, -1.5, 0.0));
-    world.join(Joint::new(board, Vec3::ZERO, wall, Vec3::ZERO));
-    world.join(Joint::to_world(board, Vec3::ZERO, Vec3::X));
-    world.join(Joint::new(board, Vec3::ZERO, ball, 1.5 * Vec3::Y));
+    let board = world.insert(Body::kinematic().shape(Shape::ball(0.5)));
+    let wall = world.insert(Body::fixed().shape(Shape::ball(0.5)).position(3.0, 0.0, 0.0));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, -1.5, 0.0));
+    world.insert_joint(Joint::new(board, Vec3::ZERO, wall, Vec3::ZERO));
+    world.insert_joint(Joint::to_world(board, Vec3::ZERO, Vec3::X));
+    world.insert_joint(Joint::new(board, Vec3::ZERO, ball, 1.5 * Vec3::Y));
     let mut simulation = simulate(world, SolverConfig::default(), open);
     for _ in 0..3 {
         simulation.step(1.0 / 60.0).expect("a step");
@@ -145,10 +145,10 @@ fn a_joint_of_bodies_that_nothing_moves_carries_nothing(open: Open) {
 /// A cube that slides at 4 m/s: v²/(2 mu g). Measured 2.1e-3 off, of all masses alike.
 fn cubes_of_all_masses_slide_as_far(open: Open) {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.4));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.4));
     for (k, mass) in MASSES.into_iter().enumerate() {
         let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(mass).friction(0.4);
-        world.add(cube.position(0.0, 0.5, 3.0 * k as f32).velocity(4.0 * Vec3::X, Vec3::ZERO));
+        world.insert(cube.position(0.0, 0.5, 3.0 * k as f32).velocity(4.0 * Vec3::X, Vec3::ZERO));
     }
     let mut simulation = simulate(world, SolverConfig::default(), open);
     for _ in 0..120 {

@@ -83,10 +83,10 @@ fn a_problem_says_what_the_bodies_are_about_to_do() {
     // A box that falls onto a plate which moves: gravity of a substep, the gap, and the plate's velocity are in it.
     let mut world = World::new();
     let plate = Body::kinematic().shape(Shape::cuboid(5.0, 0.5, 5.0)).velocity(Vec3::new(0.25, 0.125, 0.0), Vec3::ZERO);
-    world.add(plate);
+    world.insert(plate);
     let falling = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).friction(0.5).position(0.0, 1.004, 0.0);
-    world.add(falling.velocity(Vec3::NEG_Y, Vec3::ZERO));
-    world.add(Body::dynamic().shape(Shape::ball(0.5)).position(50.0, 50.0, 0.0));
+    world.insert(falling.velocity(Vec3::NEG_Y, Vec3::ZERO));
+    world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(50.0, 50.0, 0.0));
     let config = SolverConfig::default().without_sleep().with(|c| c.substeps = 4);
     let mut simulation = Simulation::with(world, config, Box::new(Cpu::new())).expect("it is sound");
     let (problem, _) = drystone_problems::step_with_contacts(&mut simulation, "plate", 0.1).expect("no joints");

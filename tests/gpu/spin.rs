@@ -43,7 +43,7 @@ fn spinning(inertia: [f32; 3], speed: f32) -> World {
         let mass = MassProperties { principal_frame: frame, ..mass };
         let rotation = Quat::from_scaled_axis(Vec3::new(-0.2, 0.5, 0.9) * k as f32);
         let spin = rotation * frame * Vec3::from(axis).normalize() * speed;
-        world.add(Body::dynamic().mass_properties(mass).rotation(rotation).velocity(Vec3::ZERO, spin));
+        world.insert(Body::dynamic().mass_properties(mass).rotation(rotation).velocity(Vec3::ZERO, spin));
     }
     world
 }
@@ -163,7 +163,7 @@ fn fast_boards_tumble() {
 fn a_spinning_board_gains_no_energy() {
     let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     let board = Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.02));
-    world.add(board.velocity(Vec3::ZERO, Vec3::new(1000.0, 300.0, 100.0)));
+    world.insert(board.velocity(Vec3::ZERO, Vec3::new(1000.0, 300.0, 100.0)));
     let drift = drift(world, 1.0 / 60.0, 600);
     assert!(drift.gained.max(drift.lost) < 1e-4, "{drift:?}");
 }

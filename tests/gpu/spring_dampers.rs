@@ -3,7 +3,7 @@
 use std::f32::consts::TAU;
 
 use drystone::glam::{Quat, Vec3};
-use drystone::{Axis, Body, Joint, Shape, Simulation, SolverConfig, World};
+use drystone::{Axis, Body, BodyHandle, Joint, Shape, Simulation, SolverConfig, World};
 
 use crate::common::Open;
 use crate::common::state::{all_bits, reference};
@@ -67,9 +67,9 @@ fn near(what: &str, measured: f32, exact: f32, share: f32) {
 /// Adds a mass that a slider leads along X, away from the place of its spring.
 fn add_on_a_slider(world: &mut World, mass: f32, spring: Axis) {
     let apart = Vec3::Z * world.bodies.len() as f32;
-    let body = world.add(cube(mass).position(0.2, 0.0, apart.z));
+    let body = world.insert(cube(mass).position(0.2, 0.0, apart.z));
     let slider = Joint::to_world(body, Vec3::ZERO, apart).along(Vec3::X);
-    world.join(slider.generic([spring, Axis::LOCKED, Axis::LOCKED], [Axis::LOCKED; 3]));
+    world.insert_joint(slider.generic([spring, Axis::LOCKED, Axis::LOCKED], [Axis::LOCKED; 3]));
 }
 
 fn on_a_slider(mass: f32, spring: Axis) -> World {
@@ -112,22 +112,22 @@ fn a_torsion_spring_turns_a_rod_about_its_end(open: Open) {
         let rod = Body::dynamic().shape(Shape::cuboid(0.5, 0.02, 0.02)).total_mass(2.0).rotation(turn);
         rod.position(center.x, center.y, center.z)
     };
-    let hinge = |body: usize, damping: f32| {
+    let hinge = |body: BodyHandle, damping: f32| {
         let hinge = Joint::to_world(body, Vec3::X * -0.5, Vec3::ZERO).hinge(Vec3::Z);
         hinge.spring_damper(0.0, stiffness, damping)
     };
     let angle = |world: &World| world.joint_motion(&world.joints[0]).position[3];
     let mut world = weightless();
-    let body = world.add(rod(0.1));
-    world.join(hinge(body, 0.0));
+    let body = world.insert(rod(0.1));
+    world.insert_joint(hinge(body, 0.0));
     let mut free = simulation(world, open);
     let inertia = 2.0 * ((1.0 + 0.04_f32.powi(2)) / 12.0 + 0.25);
     let [measured] = periods(&mut free, |world| [angle(world)]);
     near("period", measured, TAU * (inertia / stiffness).sqrt(), 4e-3);
 
     let mut world = World::new();
-    let body = world.add(rod(0.0));
-    world.join(hinge(body, 5.0));
+    let body = world.insert(rod(0.0));
+    world.insert_joint(hinge(body, 5.0));
     let mut hanging = simulation(world, open);
     (0..1200).for_each(|_| drop(hanging.step(DT).expect("a step")));
     let turned = angle(&hanging.world);
@@ -137,9 +137,9 @@ fn a_torsion_spring_turns_a_rod_about_its_end(open: Open) {
 fn a_spring_between_two_bodies_swings_with_their_reduced_mass(open: Open) {
     let (stiffness, masses) = (60.0_f32, [1.0_f32, 3.0]);
     let mut world = weightless();
-    let [a, b] = [0, 1].map(|k| world.add(cube(masses[k]).position(1.2 * k as f32, 0.0, 0.0)));
+    let [a, b] = [0, 1].map(|k| world.insert(cube(masses[k]).position(1.2 * k as f32, 0.0, 0.0)));
     let spring = Axis::FREE.spring_damper(1.0, stiffness, 0.0, f32::MAX);
-    world.join(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).at_distance(spring));
+    world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).at_distance(spring));
     let mut simulation = simulation(world, open);
     let reduced = masses[0] * masses[1] / (masses[0] + masses[1]);
     let apart = |world: &World| [world.bodies[1].position.x - world.bodies[0].position.x - 1.0];
@@ -177,9 +177,9 @@ fn constants_out_of_range_are_refused() {
 fn a_joint_that_is_off_holds_nothing_until_it_is_on(open: Open) {
     let world = |joint: Option<bool>| {
         let mut world = World::new();
-        let body = world.add(cube(2.0).velocity(Vec3::X, Vec3::Z));
+        let body = world.insert(cube(2.0).velocity(Vec3::X, Vec3::Z));
         if let Some(enabled) = joint {
-            world.join(
+            world.insert_joint(
                 Joint::to_world(body, Vec3::Y * 0.3, Vec3::Y * 0.3).hinge(Vec3::Z).motor(1.0, 50.0).enabled(enabled),
             );
         }
@@ -210,9 +210,9 @@ fn a_joint_that_is_off_holds_nothing_until_it_is_on(open: Open) {
 /// Two cubes one on the other, whose weld keeps them from colliding; off, the upper one lies on the lower one.
 fn bodies_of_a_joint_that_is_off_collide_and_wake() {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let [low, high] = [0.1, 0.25].map(|y| world.add(cube(1.0).position(0.0, y, 0.0)));
-    world.join(Joint::new(high, Vec3::ZERO, low, Vec3::Y * 0.15).fixed());
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let [low, high] = [0.1, 0.25].map(|y| world.insert(cube(1.0).position(0.0, y, 0.0)));
+    world.insert_joint(Joint::new(high, Vec3::ZERO, low, Vec3::Y * 0.15).fixed());
     let mut simulation = Simulation::with(world, SolverConfig::default(), reference()).expect("a good world");
     let steps = |simulation: &mut Simulation| (0..480).for_each(|_| drop(simulation.step(DT).expect("a step")));
     steps(&mut simulation);
@@ -234,8 +234,8 @@ fn a_spring_of_a_frequency_has_the_mass_of_two_free_bodies_at_its_anchors() {
     let (mass, radius, frequency, dt) = (3.0_f32, 0.2_f32, 2.0_f32, 1e-4);
     for arm in [Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.4] {
         let mut world = weightless();
-        let ball = world.add(Body::dynamic().shape(Shape::ball(radius)).total_mass(mass));
-        world.join(Joint::to_world(ball, arm, arm + Vec3::X * 1.1).elastic(1.0, frequency, 0.0));
+        let ball = world.insert(Body::dynamic().shape(Shape::ball(radius)).total_mass(mass));
+        world.insert_joint(Joint::to_world(ball, arm, arm + Vec3::X * 1.1).elastic(1.0, frequency, 0.0));
         let mut simulation =
             Simulation::with(world, SolverConfig::default(), Box::new(drystone::Cpu::new())).expect("a world");
         simulation.step(dt).expect("a step");
@@ -252,11 +252,11 @@ fn springs_of_a_frequency_keep_their_energy_in_every_pose() {
         let spring = Axis::FREE.spring(0.0, frequency, 0.0, f32::MAX);
         let mut angles = weightless();
         let turned = Quat::from_scaled_axis(Vec3::new(0.4, 0.9, -0.6));
-        let body = angles.add(bar().rotation(turned));
-        angles.join(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::LOCKED; 3], [spring; 3]));
+        let body = angles.insert(bar().rotation(turned));
+        angles.insert_joint(Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::LOCKED; 3], [spring; 3]));
         let mut ends = weightless();
-        let bars = [0.0, 1.0].map(|z| ends.add(bar().position(0.0, 0.0, z)));
-        ends.join(Joint::new(bars[0], Vec3::X * 0.5, bars[1], Vec3::X * -0.5).elastic(1.0, frequency, 0.0));
+        let bars = [0.0, 1.0].map(|z| ends.insert(bar().position(0.0, 0.0, z)));
+        ends.insert_joint(Joint::new(bars[0], Vec3::X * 0.5, bars[1], Vec3::X * -0.5).elastic(1.0, frequency, 0.0));
         for (name, world) in [("angles", angles), ("ends", ends)] {
             let mut simulation = simulation(world, || Box::new(drystone::Cpu::new()));
             let (mut early, mut late) = (0.0_f64, 0.0_f64);

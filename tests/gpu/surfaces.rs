@@ -64,8 +64,8 @@ fn steps(simulation: &mut Simulation, count: u32) {
 fn a_belt_takes_a_box_along_by_friction_up_to_its_speed(open: Open) {
     for (at, substeps) in [(FrictionAt::Points, 8), (FrictionAt::Manifold, 8), (FrictionAt::Points, 64)] {
         let mut world = World::new();
-        world.add(floor(belt(Vec3::new(2.0, 3.0, -1.0))));
-        let cube = world.add(cube().position(0.0, 0.5, 0.0));
+        world.insert(floor(belt(Vec3::new(2.0, 3.0, -1.0))));
+        let cube = world.insert(cube().position(0.0, 0.5, 0.0));
         let config = SolverConfig::default().with(|c| (c.friction_at, c.substeps) = (at, substeps));
         let mut simulation = simulation(world, config, open);
         // The component across the surface does nothing.
@@ -86,8 +86,8 @@ fn a_belt_takes_a_box_along_by_friction_up_to_its_speed(open: Open) {
 fn a_belt_on_a_turned_body_runs_along_the_axes_of_the_body(open: Open) {
     let mut world = World::new();
     let plate = Body::fixed().shape(Shape::cuboid(10.0, 0.5, 10.0)).material(belt(Vec3::X));
-    world.add(plate.position(0.0, -0.5, 0.0).rotation(Quat::from_rotation_y(1.1)));
-    let cube = world.add(cube().position(0.0, 0.5, 0.0));
+    world.insert(plate.position(0.0, -0.5, 0.0).rotation(Quat::from_rotation_y(1.1)));
+    let cube = world.insert(cube().position(0.0, 0.5, 0.0));
     let mut simulation = simulation(world, SolverConfig::default(), open);
     steps(&mut simulation, 60);
     let (v, wanted) = (simulation.world.bodies[cube].linear_velocity, Quat::from_rotation_y(1.1) * Vec3::X);
@@ -97,10 +97,10 @@ fn a_belt_on_a_turned_body_runs_along_the_axes_of_the_body(open: Open) {
 /// Nothing outside pushes along the floor, so the momentum of both stays zero: m v = M V, and v + V is the speed.
 fn a_box_with_a_belt_and_the_board_under_it_part_at_the_speed_of_the_belt(open: Open) {
     let mut world = World::new();
-    world.add(floor(of(0.0)));
+    world.insert(floor(of(0.0)));
     let board = Body::dynamic().shape(Shape::cuboid(4.0, 0.1, 1.0)).total_mass(12.0).position(0.0, 0.1, 0.0);
-    let board = world.add(board.friction(0.5));
-    let cube = world.add(cube().position(0.0, 0.7, 0.0).material(belt(Vec3::X * -1.2)));
+    let board = world.insert(board.friction(0.5));
+    let cube = world.insert(cube().position(0.0, 0.7, 0.0).material(belt(Vec3::X * -1.2)));
     let mut simulation = simulation(world, SolverConfig::default(), open);
     steps(&mut simulation, 60);
     let [v_board, v_cube] = [board, cube].map(|i| simulation.world.bodies[i].linear_velocity.x);
@@ -114,9 +114,9 @@ fn a_ball_slows_down_by_rolling_friction_and_stops(open: Open) {
     let slowing = 5.0 / 7.0 * G * lever / RADIUS;
     for substeps in [8, 64] {
         let mut world = World::new();
-        world.add(floor(of(0.5)));
+        world.insert(floor(of(0.5)));
         let rolling = ball(rough).velocity(Vec3::X * speed, Vec3::Z * (-speed / RADIUS));
-        let rolls = world.add(rolling.position(0.0, RADIUS, 0.0));
+        let rolls = world.insert(rolling.position(0.0, RADIUS, 0.0));
         let mut simulation = simulation(world, SolverConfig::default().with(|c| c.substeps = substeps), open);
         steps(&mut simulation, 60);
         let v = simulation.world.bodies[rolls].linear_velocity.x;
@@ -133,9 +133,9 @@ fn a_ball_slows_down_by_rolling_friction_and_stops(open: Open) {
 fn a_ball_that_spins_slows_down_by_spinning_friction(open: Open) {
     let lever = 0.01;
     let mut world = World::new();
-    world.add(floor(Material { spinning_friction: lever, ..of(0.5) }));
-    let spins = world.add(ball(of(0.5)).position(0.0, RADIUS, 0.0).velocity(Vec3::ZERO, Vec3::Y * 10.0));
-    let free = world.add(ball(of(0.5)).position(20.0, 1e3, 0.0).velocity(Vec3::ZERO, Vec3::Y * 10.0));
+    world.insert(floor(Material { spinning_friction: lever, ..of(0.5) }));
+    let spins = world.insert(ball(of(0.5)).position(0.0, RADIUS, 0.0).velocity(Vec3::ZERO, Vec3::Y * 10.0));
+    let free = world.insert(ball(of(0.5)).position(20.0, 1e3, 0.0).velocity(Vec3::ZERO, Vec3::Y * 10.0));
     let mut simulation = simulation(world, SolverConfig::default(), open);
     steps(&mut simulation, 60);
     let [w, w_free] = [spins, free].map(|i| simulation.world.bodies[i].angular_velocity.y);
@@ -153,9 +153,9 @@ fn a_ball_lies_on_slopes_below_the_angle_of_rolling_friction(open: Open) {
         let angle = (share * lever / RADIUS).atan();
         let mut world = World::new();
         world.gravity = Vec3::new(angle.sin(), -angle.cos(), 0.0) * G;
-        world.add(floor(of(0.9)));
+        world.insert(floor(of(0.9)));
         let ball = ball(Material { rolling_friction: lever, ..of(0.9) }).position(0.0, RADIUS, 0.0);
-        let ball = world.add(ball);
+        let ball = world.insert(ball);
         let mut simulation = simulation(world, SolverConfig::default().without_sleep(), open);
         // The normal force is there after the first substeps.
         let [before, v] = [10, 60].map(|count| {
@@ -184,10 +184,10 @@ impl ContactHooks for Hooks {
 
 fn a_hook_drives_a_contact_and_lets_it_resist_rolling(open: Open) {
     let mut world = World::new();
-    world.add(floor(of(0.5)));
-    let cube = world.add(cube().position(0.0, 0.5, 0.0));
+    world.insert(floor(of(0.5)));
+    let cube = world.insert(cube().position(0.0, 0.5, 0.0));
     let rolling = ball(of(0.5)).velocity(Vec3::X * 1.5, Vec3::Z * (-1.5 / RADIUS));
-    let ball = world.add(rolling.position(20.0, RADIUS, 0.0));
+    let ball = world.insert(rolling.position(20.0, RADIUS, 0.0));
     let mut simulation = simulation(world, SolverConfig::default(), open);
     simulation.set_hooks(Some(Box::new(Hooks)));
     steps(&mut simulation, 60);
@@ -199,14 +199,14 @@ fn a_hook_drives_a_contact_and_lets_it_resist_rolling(open: Open) {
 /// Belts under and on boxes, and balls that roll on them and on each other.
 fn mixture() -> World {
     let mut world = World::new();
-    world.add(floor(Material { surface_velocity: Vec3::X, spinning_friction: 0.01, ..of(0.6) }));
+    world.insert(floor(Material { surface_velocity: Vec3::X, spinning_friction: 0.01, ..of(0.6) }));
     for k in 0..4 {
         let (x, turn) = (3.0 * k as f32, Quat::from_scaled_axis(Vec3::new(0.1, 0.5, 0.2) * k as f32));
         let board = Body::dynamic().shape(Shape::cuboid(0.8, 0.1, 0.4)).rotation(turn).position(x, 0.6, 0.0);
-        world.add(board.material(belt(Vec3::new(0.3, 0.1, -1.0))));
+        world.insert(board.material(belt(Vec3::new(0.3, 0.1, -1.0))));
         let rough = Material { rolling_friction: 0.03, spinning_friction: 0.02, ..of(0.5) };
-        world.add(ball(rough).position(x + 0.3, 1.6, 0.1).velocity(Vec3::X, Vec3::new(1.0, 5.0, -2.0)));
-        world.add(ball(of(0.7)).position(x + 0.1, 2.8, 0.0));
+        world.insert(ball(rough).position(x + 0.3, 1.6, 0.1).velocity(Vec3::X, Vec3::new(1.0, 5.0, -2.0)));
+        world.insert(ball(of(0.7)).position(x + 0.1, 2.8, 0.0));
     }
     world
 }
@@ -242,11 +242,11 @@ fn lanes_have_the_bits_of_the_reference_with_belts_and_rolling_friction() {
 fn bodies_beside_a_ball_with_rolling_friction_move_as_without_it() {
     let run = |rolling_friction: f32| {
         let mut world = World::new();
-        world.add(floor(of(0.5)));
+        world.insert(floor(of(0.5)));
         for k in 0..5 {
-            world.add(cube().position(0.1 * k as f32, 0.5 + 1.01 * k as f32, 0.0).velocity(Vec3::X, Vec3::Y));
+            world.insert(cube().position(0.1 * k as f32, 0.5 + 1.01 * k as f32, 0.0).velocity(Vec3::X, Vec3::Y));
         }
-        let ball = world.add(ball(of(0.5)).position(30.0, RADIUS, 0.0));
+        let ball = world.insert(ball(of(0.5)).position(30.0, RADIUS, 0.0));
         let mut simulation = simulation(world, SolverConfig::default(), || Box::new(Cpu::new()));
         // It comes while the boxes are in contact.
         steps(&mut simulation, 20);
@@ -259,13 +259,13 @@ fn bodies_beside_a_ball_with_rolling_friction_move_as_without_it() {
 
 fn a_body_on_a_belt_stays_awake_and_a_ball_with_rolling_friction_sleeps() {
     let mut world = World::new();
-    world.add(floor(of(0.5)));
+    world.insert(floor(of(0.5)));
     let line = Body::fixed().shape(Shape::cuboid(5.0, 0.5, 1.0)).position(0.0, -0.4, 20.0);
-    let line = world.add(line);
-    world.add(Body::fixed().shape(Shape::cuboid(0.5, 2.0, 2.0)).position(1.5, 1.0, 20.0));
-    let held = world.add(cube().position(0.45, 0.6, 20.0));
+    let line = world.insert(line);
+    world.insert(Body::fixed().shape(Shape::cuboid(0.5, 2.0, 2.0)).position(1.5, 1.0, 20.0));
+    let held = world.insert(cube().position(0.45, 0.6, 20.0));
     let rolling = ball(Material { rolling_friction: 0.001, ..of(0.5) }).velocity(Vec3::X * 0.02, Vec3::Z * -0.04);
-    let ball = world.add(rolling.position(0.0, RADIUS, 0.0));
+    let ball = world.insert(rolling.position(0.0, RADIUS, 0.0));
     let mut simulation = simulation(world, SolverConfig::default(), || Box::new(Cpu::new()));
     steps(&mut simulation, 240);
     assert!(simulation.is_asleep(ball) && simulation.is_asleep(held));
@@ -280,8 +280,8 @@ fn a_body_on_a_belt_stays_awake_and_a_ball_with_rolling_friction_sleeps() {
 fn settings_that_cannot_follow_a_material_name_the_body() {
     let refused = |material: Material, config: SolverConfig| {
         let mut world = World::new();
-        world.add(floor(of(0.5)).named("floor"));
-        world.add(cube().position(0.0, 0.5, 0.0).material(material).named("crate"));
+        world.insert(floor(of(0.5)).named("floor"));
+        world.insert(cube().position(0.0, 0.5, 0.0).material(material).named("crate"));
         let simulation = Simulation::with(world, config, Box::new(Cpu::new()));
         simulation.and_then(|mut s| s.step(DT).map(drop)).expect_err("it is refused").to_string()
     };

@@ -3,7 +3,7 @@
 use crate::common::gpu;
 use crate::common::state::{all_bits, reference};
 use drystone::glam::{Quat, Vec3};
-use drystone::{Body, Cpu, Shape, Simulation, SolvedManifold, SolverConfig, World};
+use drystone::{Body, BodyHandle, Cpu, Shape, Simulation, SolvedManifold, SolverConfig, World};
 
 tests! {
     exact_gpu {
@@ -29,11 +29,11 @@ const DT: f32 = 1.0 / 60.0;
 /// Towers of cubes of 1 m on one floor, 5 m apart: body 1 is the lowest of the first.
 fn towers(heights: &[usize]) -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for (k, &height) in heights.iter().enumerate() {
         for i in 0..height {
             let cube = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
-            world.add(cube.position(5.0 * k as f32, 0.5 + i as f32, 0.0));
+            world.insert(cube.position(5.0 * k as f32, 0.5 + i as f32, 0.0));
         }
     }
     world
@@ -67,7 +67,8 @@ fn fastest(simulation: &mut Simulation, steps: u32, bodies: &[usize]) -> f32 {
 
 /// The force that presses two bodies together in the last substep, in weights of a cube.
 fn weights(simulation: &mut Simulation, pair: [usize; 2]) -> f32 {
-    let is_of = |m: &SolvedManifold| [m.body_a, m.body_b] == pair || [m.body_b, m.body_a] == pair;
+    let pair = pair.map(BodyHandle::from);
+    let is_of = |m: &SolvedManifold| [m.a.body, m.b.body] == pair || [m.b.body, m.a.body] == pair;
     simulation.manifolds().filter(is_of).map(|m| m.normal_impulse() * m.substeps as f32 / (9810.0 * DT)).sum()
 }
 
@@ -167,9 +168,9 @@ fn a_small_correction_keeps_impulses() {
 fn a_platform_that_the_caller_moves_little_by_little_keeps_impulses() {
     for kind in [Body::fixed(), Body::kinematic()] {
         let mut world = World::new();
-        world.add(kind.shape(Shape::cuboid(9.0, 0.05, 9.0)).position(0.0, -0.05, 0.0));
+        world.insert(kind.shape(Shape::cuboid(9.0, 0.05, 9.0)).position(0.0, -0.05, 0.0));
         for i in 0..5 {
-            world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
+            world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5 + i as f32, 0.0));
         }
         let mut simulation = settled(world, SolverConfig::default().without_sleep());
         for _ in 0..20 {

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::random::SplitMix64;
-use drystone::{Axis, Body, BodyKind, Error, Groups, Joint, Linear, Shape, World, named};
+use drystone::{Axis, Body, BodyHandle, BodyKind, Error, Groups, Joint, Linear, Shape, World, named};
 use drystone_scenes::Scene;
 
 /// The things that the worlds of a family have beside bodies of 0.1 to 1 m and 100 to 10,000 kg/m³ on joints.
@@ -264,14 +264,14 @@ impl Drawn {
         let mut world = World::new();
         let has_floor = random.happens(0.5);
         if has_floor {
-            world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).named("floor"));
+            world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).named("floor"));
         } else if random.happens(0.8) {
             world.gravity = Vec3::ZERO;
         }
         let count = 2 + random.below(6);
         let driver = (self.family == Family::Kinematic).then(|| random.below(count));
         let mut at = Vec3::Y * if has_floor { 2.5 } else { 0.0 };
-        let mut chain: Vec<(usize, f32)> = Vec::new();
+        let mut chain: Vec<(BodyHandle, f32)> = Vec::new();
         for i in 0..count {
             let (mut own, size) = body(random, self.family);
             at += Vec3::new(random.within(SPACING.0, SPACING.1), 0.0, 0.0)
@@ -293,7 +293,7 @@ impl Drawn {
             if !self.collides {
                 own.groups = Groups { membership: 2 << i, filter: 1 };
             }
-            chain.push((world.add(own.position(at.x, at.y, at.z).named(format!("b{i}"))), size));
+            chain.push((world.insert(own.position(at.x, at.y, at.z).named(format!("b{i}"))), size));
         }
         let first_joint = random.happens(0.15) && driver.is_none();
         for i in usize::from(!first_joint)..count {
@@ -315,9 +315,9 @@ impl Drawn {
     }
 
     /// Joins body b to body a, or to the world, `away` from the center of b.
-    fn join(&self, random: &mut Random, world: &mut World, ends: [Option<usize>; 2], away: Vec3, is_there: bool) {
+    fn join(&self, random: &mut Random, world: &mut World, ends: [Option<BodyHandle>; 2], away: Vec3, is_there: bool) {
         let [Some(b), a] = ends else { return };
-        let pose = |body: Option<usize>| {
+        let pose = |body: Option<BodyHandle>| {
             body.map_or((Vec3::ZERO, Quat::IDENTITY), |i| (world.bodies[i].position, world.bodies[i].rotation))
         };
         let ((at_b, turn_b), (at_a, turn_a)) = (pose(Some(b)), pose(a));
@@ -334,15 +334,15 @@ impl Drawn {
         let tie = tie.along(along).zero_at(frames.0, frames.1);
         let mut tie = joint(random, self.kind, tie, beside);
         tie.collide = self.collides;
-        let mass = |body: Option<usize>| body.map_or(0.0, |i| world.bodies[i].mass.mass);
+        let mass = |body: Option<BodyHandle>| body.map_or(0.0, |i| world.bodies[i].mass.mass);
         let lighter = match (mass(a), mass(Some(b))) {
             (x, y) if x > 0.0 && y > 0.0 => x.min(y),
             (x, y) => x.max(y),
         };
         drive(random, self.family, &mut tie, 10.0 * lighter);
-        let moves = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
+        let moves = |i: BodyHandle| world.bodies[i].kind == BodyKind::Dynamic;
         if is_there && self.kind != Kind::None && (moves(b) || a.is_some_and(moves)) {
-            world.join(tie);
+            world.insert_joint(tie);
         }
     }
 }

@@ -58,12 +58,13 @@ impl Mechanics {
         }
         let (common, drift) = (all.moment / all.mass, all.momentum / all.mass);
         all.common = 0.5 * all.mass * drift.length_squared();
-        for (i, body) in world.bodies.iter().enumerate().filter(|(_, body)| body.kind == BodyKind::Dynamic) {
+        for handle in world.bodies.handles().filter(|&body| world.bodies[body].kind == BodyKind::Dynamic) {
+            let body = &world.bodies[handle];
             let (m, x, v) = (f64::from(body.mass.mass), center(body), body.linear_velocity.as_dvec3());
             let spin = body.angular_velocity.as_dvec3();
             let own = inertia(body) * spin;
             all.kinetic += 0.5 * m * v.length_squared() + 0.5 * spin.dot(own);
-            all.potential -= m * world.gravity_on(i).as_dvec3().dot(x);
+            all.potential -= m * world.gravity_on(handle).as_dvec3().dot(x);
             let (arm, beside) = (x - common, v - drift);
             all.spin += m * arm.cross(beside) + own;
             all.spin_about_origin += m * x.cross(v) + own;

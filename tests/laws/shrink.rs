@@ -212,7 +212,7 @@ fn without_body(world: &mut World, i: usize) -> bool {
     for joint in world.joints.iter() {
         let b = joint.body_b.map(|b| place[b.index()]);
         if let (Some(body_a), Some(body_b)) = (place[joint.body_a.index()], b.map_or(Some(None), |b| b.map(Some))) {
-            next.join(Joint { body_a, body_b, ..*joint });
+            next.insert_joint(Joint { body_a, body_b, ..*joint });
         }
     }
     *world = next;

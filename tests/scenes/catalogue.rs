@@ -2,7 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::metrics::{in_place, rms_speed};
-use drystone::{Backend, Body, BodyKind, Bounds, Cpu, Event, Reference, Simulation, SolverConfig};
+use drystone::{Backend, Body, BodyKind, Bounds, ColliderOf, Cpu, Event, Reference, Simulation, SolverConfig};
 use drystone_scenes::{CATALOGUE, Scene, Spawners};
 
 /// A scene of the catalogue, and its simulation after some steps.
@@ -37,12 +37,12 @@ fn fallen(scene: &Scene, simulation: &Simulation) -> usize {
 fn bears_its_weight(name: &str, simulation: &mut Simulation) {
     let manifolds: Vec<_> = simulation.manifolds().collect();
     let world = &simulation.world;
-    let is_fixed = |body: usize| world.bodies[body].kind == BodyKind::Fixed;
+    let is_fixed = |side: ColliderOf| world.bodies[side.body].kind == BodyKind::Fixed;
     let mut pushed = Vec3::ZERO;
-    for m in manifolds.iter().filter(|m| is_fixed(m.body_a) || is_fixed(m.body_b)) {
+    for m in manifolds.iter().filter(|m| is_fixed(m.a) || is_fixed(m.b)) {
         let sum: Vec3 = m.points().iter().map(|p| m.normal * p.normal_impulse + p.friction_impulse).sum();
         let substep = 1.0 / 60.0 / m.substeps as f32;
-        pushed += if is_fixed(m.body_a) { sum } else { -sum } / substep;
+        pushed += if is_fixed(m.a) { sum } else { -sum } / substep;
     }
     let dynamic = world.bodies.iter().filter(|b| b.kind == BodyKind::Dynamic);
     let weight = -world.gravity * dynamic.map(|b| b.mass.mass).sum::<f32>();

@@ -59,19 +59,19 @@ fn bodies_come_every_so_many_steps_and_leave_below_a_height_or_after_a_time() {
 #[test]
 fn a_spawner_waits_while_its_place_is_taken() {
     let mut scene = Scene::new("pipe", World::new(), 600);
-    scene.world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    scene.world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for (x, z) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
         let wall = Body::fixed().shape(Shape::cuboid(0.6, 5.0, 0.6));
-        scene.world.add(wall.position(0.95 * x, 5.0, 0.95 * z));
+        scene.world.insert(wall.position(0.95 * x, 5.0, 0.95 * z));
     }
     let group = |bit: u32| Groups { membership: bit, filter: bit };
     let ball = Body::dynamic().shape(Shape::ball(0.3)).position(0.0, 3.0, 0.0).groups(group(1));
     scene.spawners.push(Spawner { count: Some(20), ..Spawner::new(ball, 1) });
     // Fixed bodies, sensors and bodies of other groups do not block it.
-    scene.world.add(Body::fixed().sensor(Shape::ball(5.0)));
-    scene.world.add(Body::fixed().shape(Shape::ball(0.1)).position(0.0, 3.39, 0.0));
+    scene.world.insert(Body::fixed().sensor(Shape::ball(5.0)));
+    scene.world.insert(Body::fixed().shape(Shape::ball(0.1)).position(0.0, 3.39, 0.0));
     let other = Body::kinematic().shape(Shape::ball(0.3)).position(0.0, 3.0, 0.0);
-    scene.world.add(other.groups(group(2)));
+    scene.world.insert(other.groups(group(2)));
     let (mut came, mut deepest) = (Vec::new(), 0.0_f64);
     let (_, spawners) = run(&scene, 600, |world, spawners| {
         came.push(spawners.came());
@@ -106,7 +106,8 @@ fn spawners_go_the_same_way_on_any_backend_and_in_worlds_beside_each_other() {
     std::fs::remove_file(&path).expect("the file");
     let (both, _) = run(&both, 50, |_, _| {});
     let worlds = both.world.worlds();
-    let [first, second] = [0, 1].map(|k| worlds[k].iter().map(|&i| state(&both.world, i)).collect::<Vec<_>>());
+    let [first, second] =
+        [0, 1].map(|k| worlds[k].iter().map(|body| state(&both.world, body.index())).collect::<Vec<_>>());
     assert_eq!(first, second);
     let mut own: Vec<_> = alone.world.bodies.handles().map(|handle| state(&alone.world, handle.index())).collect();
     let mut first = first;

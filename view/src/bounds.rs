@@ -118,9 +118,9 @@ mod tests {
         let mut world = World::new();
         for i in 0..count {
             let x = i as f32 + if i + 1 == count { away } else { 0.0 };
-            world.add(Body::dynamic().shape(Shape::cuboid(0.4, 0.4, 0.4)).position(x, 0.0, 0.0));
+            world.insert(Body::dynamic().shape(Shape::cuboid(0.4, 0.4, 0.4)).position(x, 0.0, 0.0));
         }
-        world.join(Joint::to_world(count - 1, Vec3::ZERO, Vec3::X * (count as f32 - 1.0)).rope(1e9));
+        world.insert_joint(Joint::to_world(count - 1, Vec3::ZERO, Vec3::X * (count as f32 - 1.0)).rope(1e9));
         world
     }
 

@@ -113,8 +113,8 @@ impl ColorBy {
                 for manifold in manifolds {
                     let impulse = manifold.normal_impulse();
                     let Some(color) = manifold.color else { continue };
-                    for body in [manifold.body_a, manifold.body_b] {
-                        let best = &mut most[body];
+                    for side in [manifold.a, manifold.b] {
+                        let best = &mut most[side.body.index()];
                         *best = if impulse > best.0 { (impulse, f32::from(color)) } else { *best };
                     }
                 }
@@ -123,8 +123,9 @@ impl ColorBy {
             Self::Impulse => {
                 let mut sums = vec![0.0; world.bodies.len()];
                 for manifold in manifolds {
-                    sums[manifold.body_a] += manifold.normal_impulse();
-                    sums[manifold.body_b] += manifold.normal_impulse();
+                    for side in [manifold.a, manifold.b] {
+                        sums[side.body.index()] += manifold.normal_impulse();
+                    }
                 }
                 sums
             }

@@ -57,7 +57,7 @@ pub fn lines(simulation: &mut Simulation, overlay: Overlay, size: f32) -> Vec<Li
         ends.extend([from, to].map(|p| LineEnd { position: p.to_array(), color }));
     };
     for manifold in &manifolds {
-        let center = world.bodies[manifold.body_a].center_of_mass();
+        let center = world.bodies[manifold.a.body].center_of_mass();
         let color = manifold.color.map_or(GAP, |c| batch_color(c.into()));
         for point in manifold.points() {
             let at = center + point.r_a;

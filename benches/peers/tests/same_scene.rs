@@ -86,11 +86,11 @@ fn friction_of_two_materials_is_their_geometric_mean() {
     let (angle, mu) = (20.0_f32.to_radians(), 0.2_f32);
     let mut world = World::new();
     let normal = Vec3::new(angle.sin(), angle.cos(), 0.0);
-    world.add(Body::fixed().shape(Shape::half_space(normal)).friction(0.8));
+    world.insert(Body::fixed().shape(Shape::half_space(normal)).friction(0.8));
     let start = 0.5 * normal;
     let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).friction(0.05);
     let turned = block.rotation(Quat::from_rotation_z(-angle)).position(start.x, start.y, start.z);
-    let block = world.add(turned);
+    let block = world.insert(turned);
     let scene = Scene::new("slope", world, 120);
     for engine in Engine::built() {
         let moved = run(engine, &scene, 120).bodies[block].position.distance(start);
@@ -111,7 +111,7 @@ fn a_compound_flies_straight_about_its_center_of_mass() {
         .rotation(Quat::from_rotation_x(0.7))
         .velocity(linear, angular);
     let (start, spin) = (body.center_of_mass(), body.angular_momentum());
-    world.add(body);
+    world.insert(body);
     let scene = Scene::new("flight", world, 30);
     for engine in Engine::built() {
         let after = &run(engine, &scene, 30).bodies[0];
@@ -133,8 +133,8 @@ fn a_compound_flies_straight_about_its_center_of_mass() {
 fn restitution_of_two_materials_is_the_larger() {
     // A ball falls by 1 m and comes back by e²; the mean of both, 0.4, would bring it to 0.16 m.
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 1.5, 0.0).restitution(0.8));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 1.5, 0.0).restitution(0.8));
     let scene = Scene::new("bounce", world, 60);
     for engine in Engine::built() {
         let heights = (30..60).map(|steps| run(engine, &scene, steps).bodies[ball].position.y - 0.5);
@@ -151,10 +151,10 @@ fn restitution_of_two_materials_is_the_larger() {
 fn a_force_pushes_in_every_step_and_a_spinning_drum_turns() {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    let pushed = world.add(Body::dynamic().shape(Shape::ball(0.5)).total_mass(2.0));
+    let pushed = world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(2.0));
     world.bodies[pushed].force = Vec3::new(3.0, 0.0, -1.0);
     let drum = Body::kinematic().shape_at(Shape::ball(0.1), Vec3::X, Quat::IDENTITY).position(5.0, 0.0, 0.0);
-    let drum = world.add(drum.velocity(Vec3::Y, Vec3::new(0.0, 0.0, 2.0)));
+    let drum = world.insert(drum.velocity(Vec3::Y, Vec3::new(0.0, 0.0, 2.0)));
     let scene = Scene::new("push", world, 60);
     for engine in Engine::built() {
         let after = run(engine, &scene, 60);
@@ -174,8 +174,8 @@ fn joints_hold_and_a_pendulum_swings_with_its_period() {
     let turn = Quat::from_rotation_z(lift);
     let start = turn * Vec3::new(0.0, -length, 0.0);
     let ball = Body::dynamic().shape(Shape::ball(radius)).rotation(turn).position(start.x, start.y, start.z);
-    let ball = world.add(ball);
-    world.join(Joint::to_world(ball, Vec3::new(0.0, length, 0.0), Vec3::ZERO));
+    let ball = world.insert(ball);
+    world.insert_joint(Joint::to_world(ball, Vec3::new(0.0, length, 0.0), Vec3::ZERO));
     let period = std::f32::consts::TAU * ((length + 0.4 * radius * radius / length) / 9.81).sqrt();
     let steps = (period * 60.0).round() as u32;
     let scene = Scene::new("pendulum", world, steps);
@@ -223,8 +223,8 @@ fn every_shape_lies_as_high_as_it_is() {
     for (ground, below, name) in grounds {
         for (shape, height) in &shapes {
             let mut world = World::new();
-            world.add(Body::fixed().shape(ground.clone()).position(0.0, below, 0.0));
-            let lying = world.add(Body::dynamic().shape(shape.clone()).position(0.0, height + 0.01, 0.0));
+            world.insert(Body::fixed().shape(ground.clone()).position(0.0, below, 0.0));
+            let lying = world.insert(Body::dynamic().shape(shape.clone()).position(0.0, height + 0.01, 0.0));
             let scene = Scene::new("lies", world, 60);
             for engine in Engine::built() {
                 let y = run(engine, &scene, 60).bodies[lying].position.y;
@@ -270,7 +270,7 @@ fn a_hull_with_too_many_corners_is_taken_or_refused() {
     };
     let hull = Shape::convex_hull(&(0..600).map(corner).collect::<Vec<_>>()).expect("a hull");
     let mut world = World::new();
-    world.add(Body::dynamic().shape(hull));
+    world.insert(Body::dynamic().shape(hull));
     let scene = Scene::new("hull", world, 1);
     for engine in Engine::built() {
         let (said, heard) = std::sync::mpsc::channel();

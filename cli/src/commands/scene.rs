@@ -12,7 +12,7 @@ use drystone::config::{LONGEST_STEP, Method, SHORTEST_STEP};
 use drystone::load::Load;
 use drystone::preset::Preset;
 use drystone::stages::memory;
-use drystone::{Error, Result, SolverConfig};
+use drystone::{BodyHandle, Error, Result, SolverConfig};
 use drystone_problems::ContactProblem;
 #[cfg(feature = "view")]
 use drystone_scenes::Replay;
@@ -228,7 +228,8 @@ fn choose_substeps(config: &mut SolverConfig, scene: &Scene, most: f64) -> Resul
         return Ok(());
     };
     config.substeps = load.substeps(most, scene.dt, config)?;
-    let (substeps, Load { upper, lower, force, .. }) = (config.substeps, load);
+    let (substeps, Load { force, .. }) = (config.substeps, load);
+    let [upper, lower] = [load.upper, load.lower].map(BodyHandle::index);
     let overlap = 1e3 * load.overlap(substeps, scene.dt, config);
     say(format_args!(
         "substeps {substeps}: body {upper} presses on body {lower} with {force:.3e} N, which makes {overlap:.3} mm"

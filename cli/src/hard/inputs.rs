@@ -24,14 +24,14 @@ pub(super) fn far_and_bad(setup: &Setup, checks: &mut Checks) -> Result<()> {
     // A refusal must have the name of the body.
     let is_taken = |body: &&Body| {
         let mut world = floor(0.5);
-        world.add((*body).clone().named("culprit"));
+        world.insert((*body).clone().named("culprit"));
         setup.simulation(world).map_or_else(|e| !e.to_string().contains("culprit"), |_| true)
     };
     let taken = bad.iter().filter(is_taken).count();
     checks.at_most(format!("invalid bodies accepted, of {}", bad.len()), taken as f64, 0.0);
     let mut world = floor(0.5);
     let tiny = f32::MIN_POSITIVE / 8.0;
-    world.add(cube(0.0, 0.5).velocity(Vec3::splat(tiny), Vec3::splat(tiny)).position(tiny, 0.5, tiny));
+    world.insert(cube(0.0, 0.5).velocity(Vec3::splat(tiny), Vec3::splat(tiny)).position(tiny, 0.5, tiny));
     let mut simulation = setup.simulation(world)?;
     (0..60).try_for_each(|_| simulation.step(DT).map(drop))?;
     checks.finite("subnormal numbers: ", &simulation.world);

@@ -140,7 +140,7 @@ const LEAST: f64 = f64::NEG_INFINITY;
 
 fn floor(friction: f32) -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(friction));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(friction));
     world
 }
 
@@ -242,8 +242,8 @@ mod tests {
     #[test]
     fn overlap_is_looked_at_on_the_way() {
         let mut world = weightless();
-        world.add(cube(0.0, 0.0));
-        world.add(cube(0.8, 0.0));
+        world.insert(cube(0.0, 0.0));
+        world.insert(cube(0.8, 0.0));
         let open = || Ok(Box::new(drystone::Cpu::new()) as Box<dyn Backend>);
         let setup = Setup { config: SolverConfig::default().with(|c| c.push_limit = 0.1), open: &open };
         let outcome = setup.outcome(world, 300).expect("a run");

@@ -73,9 +73,9 @@ fn cube_on_pads(side: usize) -> World {
     let step = 1.8 / side.max(2) as f32;
     for i in 0..side * side {
         let at = |k: usize| (k as f32 - (side as f32 - 1.0) / 2.0) * step;
-        world.add(Body::fixed().shape(Shape::cuboid(0.1, 0.1, 0.1)).position(at(i % side), -0.1, at(i / side)));
+        world.insert(Body::fixed().shape(Shape::cuboid(0.1, 0.1, 0.1)).position(at(i % side), -0.1, at(i / side)));
     }
-    world.add(Body::dynamic().shape(Shape::cuboid(1.0, 1.0, 1.0)).position(0.0, 1.0, 0.0));
+    world.insert(Body::dynamic().shape(Shape::cuboid(1.0, 1.0, 1.0)).position(0.0, 1.0, 0.0));
     world
 }
 
@@ -86,7 +86,7 @@ fn asymmetry(manifolds: impl Iterator<Item = SolvedManifold> + Clone, side: usiz
     let points = manifolds.clone().map(|m| m.points().len()).sum();
     // The pads are the first bodies, row by row.
     let mut forces = vec![f64::NAN; side * side];
-    manifolds.for_each(|m| forces[m.body_a.min(m.body_b)] = force(&m));
+    manifolds.for_each(|m| forces[m.a.body.index().min(m.b.body.index())] = force(&m));
     let image = |i: usize| {
         let fold = |k: usize| k.min(side - 1 - k);
         let (x, z) = (fold(i % side), fold(i / side));

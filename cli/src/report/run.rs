@@ -272,12 +272,13 @@ impl RunReport {
         self.hash = format!("{:016x}", simulation.hash());
         let world = &simulation.into_world();
         let penetration = Penetration::of_world(world, &self.config);
-        let (speed, body) = fastest(world);
+        let fastest = fastest(world);
         self.penetration_max = penetration.max;
         self.penetration_p95 = penetration.p95;
         self.penetration_mean = penetration.mean;
-        self.speed_max = speed;
-        self.fastest = (speed != 0.0).then(|| body_name(world, body));
+        self.speed_max = fastest.map_or(0.0, |(speed, _)| speed);
+        let moving = fastest.filter(|(speed, _)| *speed != 0.0);
+        self.fastest = moving.map(|(_, body)| body_name(world, body.index()));
         self.speed_rms = rms_speed(world);
         self.kinetic_energy = world.kinetic_energy();
         self.energy_gained = energy(world) - self.energy_before;
@@ -302,14 +303,14 @@ impl RunReport {
         let groups = scene.groups.iter().map(|group| standing(&group.name, group.bodies.clone())).collect();
         (self.in_place, self.standing) = (all, groups);
         self.non_finite = world.bodies.iter().filter(|b| !b.is_finite()).count();
-        self.first_non_finite = world.first_non_finite().map(|i| body_name(world, i));
+        self.first_non_finite = world.first_non_finite().map(|body| body_name(world, body.index()));
     }
 }
 
 /// Number of manifolds with a dynamic body, asleep or awake, and of their points.
 fn contacts(simulation: &mut Simulation) -> (usize, usize) {
     let moves: Vec<bool> = simulation.world.bodies.iter().map(|body| body.kind == BodyKind::Dynamic).collect();
-    let of_bodies = simulation.manifolds().filter(|m| moves[m.body_a] || moves[m.body_b]);
+    let of_bodies = simulation.manifolds().filter(|m| moves[m.a.body.index()] || moves[m.b.body.index()]);
     of_bodies.fold((0, 0), |(manifolds, points), m| (manifolds + 1, points + m.points().len()))
 }
 

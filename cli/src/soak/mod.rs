@@ -89,7 +89,10 @@ impl Soaked {
             energy += self.simulation.world.kinetic_energy();
             if let Some(body) = stats.first_non_finite {
                 let (name, step) = (&self.scene.name, self.step);
-                return Err(Error::input(format!("{name}: body {body} left the finite range in step {step}")));
+                return Err(Error::input(format!(
+                    "{name}: body {} left the finite range in step {step}",
+                    body.index()
+                )));
             }
         }
         let mean = |sum: f64| sum / f64::from(steps);

@@ -77,14 +77,14 @@ fn shaken() -> (Scene, Acts) {
 
 fn waking() -> (Scene, Acts) {
     let mut world = World::new();
-    world.add(tray(Body::fixed(), 2.0));
+    world.insert(tray(Body::fixed(), 2.0));
     let boxes = boxes(&mut world, 24, 0.2, 0.8);
     (scene(world, 2.0), Acts::Throws { boxes, random: SplitMix64::new(3) })
 }
 
 fn rain() -> (Scene, Acts) {
     let mut world = World::new();
-    world.add(tray(Body::fixed(), 1.5));
+    world.insert(tray(Body::fixed(), 1.5));
     let rain = Rain { here: VecDeque::new(), gone: VecDeque::new(), keeps: 60, came: 0, random: SplitMix64::new(5) };
     (scene(world, 1.5), Acts::Rains(rain))
 }
@@ -146,7 +146,7 @@ impl Rain {
             let middle = a.position.midpoint(b.position);
             let anchor = |body: &Body| body.rotation.inverse() * (middle - body.position);
             let joint = Joint::new(before.expect("a body"), anchor(a), new, anchor(b));
-            world.join(joint);
+            world.insert_joint(joint);
         }
         self.here.push_back(new);
     }

@@ -11,8 +11,8 @@ use drystone::{Body, Shape, World};
 /// A ball of radius 0.5 m. Its lowest point is `height` above a half-space (m).
 pub(super) fn sphere_plane(height: f32) -> Scene {
     let mut world = World::new();
-    world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)));
-    world.add(Body::dynamic().named("ball").shape(Shape::ball(0.5)).position(0.0, 0.5 + height, 0.0));
+    world.insert(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::dynamic().named("ball").shape(Shape::ball(0.5)).position(0.0, 0.5 + height, 0.0));
     Scene::new("sphere-plane", world, 300)
 }
 
@@ -37,15 +37,15 @@ pub(super) fn roll(degrees: f32, mu: f32) -> Scene {
 /// Source: SimBenchmark, "rolling".
 pub(super) fn rolling(degrees: f32) -> Scene {
     let mut world = World::new();
-    world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)).friction(0.2));
+    world.insert(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)).friction(0.2));
     let plate = Body::dynamic().named("plate").shape(Shape::cuboid(10.0, 0.5, 10.0)).total_mass(10.0).friction(0.8);
-    let plate = world.add(plate.position(0.0, 0.5, 0.0));
+    let plate = world.insert(plate.position(0.0, 0.5, 0.0));
     let (sin, cos) = libm::sincosf(degrees.to_radians());
     world.bodies[plate].force = 150.0 * Vec3::new(cos, 0.0, sin);
     for k in 0..25 {
         let [x, z] = [k / 5, k % 5].map(|k| 2.0 * centered(k, 5) as f32);
         let ball = Body::dynamic().named(format!("ball {k}")).shape(Shape::ball(0.5)).total_mass(1.0).friction(0.8);
-        world.add(ball.position(x, 1.5, z));
+        world.insert(ball.position(x, 1.5, z));
     }
     Scene { dt: 1e-3, ..Scene::new("rolling", world, 4000) }
 }
@@ -54,9 +54,9 @@ pub(super) fn rolling(degrees: f32) -> Scene {
 pub(super) fn on_slope(name: &str, body: Body, height: f32, degrees: f32, mu: f32) -> Scene {
     let angle = degrees.to_radians();
     let mut world = World::new();
-    world.add(slope(angle).friction(mu));
+    world.insert(slope(angle).friction(mu));
     let (x, y) = (height * libm::sinf(angle), height * libm::cosf(angle));
-    world.add(body.friction(mu).position(x, y, 0.0).rotation(about(Vec3::Z, -angle)));
+    world.insert(body.friction(mu).position(x, y, 0.0).rotation(about(Vec3::Z, -angle)));
     Scene::new(name, world, 120)
 }
 
@@ -68,6 +68,6 @@ pub(super) fn throw(n: usize, speed: f32) -> Scene {
     stack(&mut world, n, 0.0, |_| ([0.0; 2], 1000.0));
     let rise = 0.5 * -world.gravity.y * DISTANCE / speed;
     let ball = Body::dynamic().named("ball").shape(Shape::ball(0.5)).velocity(Vec3::new(speed, rise, 0.0), Vec3::ZERO);
-    world.add(ball.position(-1.0 - DISTANCE, (0.5 * n as f32).max(0.5), 0.0));
+    world.insert(ball.position(-1.0 - DISTANCE, (0.5 * n as f32).max(0.5), 0.0));
     Scene::new("throw", world, 400)
 }

@@ -64,8 +64,8 @@ fn heap(
     let mut world = floor(half + 1.0, half + 1.0);
     let (along_z, along_x) = (Shape::cuboid(0.5, top / 2.0, half + 1.0), Shape::cuboid(half, top / 2.0, 0.5));
     for s in [half + 0.5, -half - 0.5] {
-        world.add(Body::fixed().named("wall").shape(along_z.clone()).position(s, top / 2.0, 0.0));
-        world.add(Body::fixed().named("wall").shape(along_x.clone()).position(0.0, top / 2.0, s));
+        world.insert(Body::fixed().named("wall").shape(along_z.clone()).position(s, top / 2.0, 0.0));
+        world.insert(Body::fixed().named("wall").shape(along_x.clone()).position(0.0, top / 2.0, s));
     }
 
     let mut random = SplitMix64::new(seed);
@@ -76,7 +76,7 @@ fn heap(
         let y = layer as f64 * PITCH + LOWEST + jitter * random.symmetric();
         let z = centered(row, side) * PITCH + shift + jitter * random.symmetric();
         let turn = small_turn(&mut random);
-        world.add(body(i, &mut random)?.position(x as f32, y as f32, z as f32).rotation(turn));
+        world.insert(body(i, &mut random)?.position(x as f32, y as f32, z as f32).rotation(turn));
     }
     let container = Some((Vec3::new(-half, 0.0, -half), Vec3::new(half, top, half)));
     Ok(Scene { container, ..Scene::new(name, world, 600) })
@@ -124,7 +124,7 @@ fn add_pyramid(world: &mut World, base: usize, [x, z]: [f64; 2], gap: f32) {
         let boxes = base - row;
         for column in 0..boxes {
             let x = x + centered(column, boxes) * PYRAMID_PITCH;
-            world.add(body.clone().position(x as f32, row as f32 + 0.5 + lifted(row, gap), z as f32));
+            world.insert(body.clone().position(x as f32, row as f32 + 0.5 + lifted(row, gap), z as f32));
         }
     }
 }
@@ -142,7 +142,7 @@ pub(super) fn wall(rows: usize, columns: usize, gap: f32) -> Scene {
     let end = (columns as f64 * PITCH - GAP - HALF_BRICK) / 2.0;
     for row in 0..rows {
         let y = row as f32 * 0.5 + 0.25 + 0.5 * lifted(row, gap);
-        let mut lay = |body: &Body, x: f64| world.add(body.clone().position(x as f32, y, 0.0));
+        let mut lay = |body: &Body, x: f64| world.insert(body.clone().position(x as f32, y, 0.0));
         if row % 2 == 0 {
             (0..columns).for_each(|k| _ = lay(&whole, centered(k, columns) * PITCH));
         } else {

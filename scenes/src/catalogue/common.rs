@@ -8,7 +8,7 @@ use drystone::{Body, Shape, World};
 pub(super) fn floor(half_x: f32, half_z: f32) -> World {
     let mut world = World::new();
     let shape = Shape::cuboid(half_x, 0.5, half_z);
-    world.add(Body::fixed().named("floor").shape(shape).position(0.0, -0.5, 0.0));
+    world.insert(Body::fixed().named("floor").shape(shape).position(0.0, -0.5, 0.0));
     world
 }
 

@@ -19,7 +19,7 @@ const WIDTH: f32 = 3.0;
 pub(super) fn course(spin: f32) -> Scene {
     let mut world = floor(24.0, 2.0 * WIDTH);
     let block = |world: &mut World, name: &str, half: Vec3, at: Vec3| {
-        world.add(Body::fixed().named(name).shape(Shape::cuboid(half.x, half.y, half.z)).position(at.x, at.y, at.z))
+        world.insert(Body::fixed().named(name).shape(Shape::cuboid(half.x, half.y, half.z)).position(at.x, at.y, at.z))
     };
     let top = RISE * STAIRS as f32;
     let landing = 2.0 + TREAD * STAIRS as f32;
@@ -31,10 +31,10 @@ pub(super) fn course(spin: f32) -> Scene {
     block(&mut world, "landing", Vec3::new(1.0, 0.5 * top, WIDTH), Vec3::new(landing + 1.0, 0.5 * top, 0.0));
     slope(&mut world, -30.0, Vec3::new(landing + 2.0, top, 0.0), 2.0 * top);
     let turntable = Body::kinematic().named("turntable").shape(Shape::cylinder(0.1, 2.0)).position(10.5, 0.1, 0.0);
-    world.add(turntable.velocity(Vec3::ZERO, spin * Vec3::Y));
+    world.insert(turntable.velocity(Vec3::ZERO, spin * Vec3::Y));
     for z in [-0.7, 0.0, 0.7] {
         let crate_ = Body::dynamic().named("crate").shape(Shape::cuboid(0.3, 0.3, 0.3)).total_mass(30.0);
-        world.add(crate_.position(14.0, 0.3, z));
+        world.insert(crate_.position(14.0, 0.3, z));
     }
     slope(&mut world, 50.0, Vec3::new(20.0, 0.0, 0.0), 3.0);
     let capsule = Shape::capsule(0.6, 0.3);
@@ -47,5 +47,5 @@ fn slope(world: &mut World, degrees: f32, begin: Vec3, length: f32) {
     let turn = about(Vec3::Z, degrees.to_radians());
     let at = begin + turn * Vec3::new(0.5 * length, -0.1, 0.0);
     let slope = Body::fixed().named("slope").shape(Shape::cuboid(0.5 * length, 0.1, WIDTH)).rotation(turn);
-    world.add(slope.position(at.x, at.y, at.z));
+    world.insert(slope.position(at.x, at.y, at.z));
 }

@@ -18,10 +18,10 @@ const CELLS: u16 = 8;
 /// Every kind of shape in a row along x, `height` above the surfaces: first a floor, then a mesh, then a height field.
 pub(super) fn drop(height: f32) -> Result<Scene> {
     let mut world = World::new();
-    world.add(Body::fixed().named("floor").shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().named("floor").shape(Shape::half_space(Vec3::Y)));
 
     let lying = about(Vec3::X, std::f32::consts::FRAC_PI_2);
-    let mut place = |body: Body, name: &str, x: f32, y: f32| world.add(body.named(name).position(x * PITCH, y, 0.0));
+    let mut place = |body: Body, name: &str, x: f32, y: f32| world.insert(body.named(name).position(x * PITCH, y, 0.0));
 
     place(Body::dynamic().shape(Shape::ball(0.5)), "ball", -3.0, 0.5 + height);
     place(Body::dynamic().shape(Shape::capsule(0.5, 0.3)).rotation(lying), "capsule", -2.0, 0.3 + height);

@@ -26,10 +26,10 @@ pub(super) fn drum(n: usize, speed: f32) -> Scene {
         places = grid(radius);
     }
     let mut world = World::new();
-    world.add(hollow(radius).velocity(Vec3::ZERO, speed * Vec3::Z));
+    world.insert(hollow(radius).velocity(Vec3::ZERO, speed * Vec3::Z));
     let cube = Body::dynamic().shape(Shape::cuboid(SIDE / 2.0, SIDE / 2.0, SIDE / 2.0));
     for Vec3 { x, y, z } in places.into_iter().take(n) {
-        world.add(cube.clone().position(x, y, z));
+        world.insert(cube.clone().position(x, y, z));
     }
     let corner = radius / libm::cosf(TAU / 2.0 / f32::from(STAVES));
     let reach = Vec3::new(corner, corner, radius / 2.0);

@@ -20,7 +20,7 @@ const SHEET: f32 = 0.0005;
 /// turn.
 pub(super) fn terrain(n: usize, height: f32, seed: u64) -> Result<Scene> {
     let mut world = World::new();
-    world.add(Body::fixed().named("terrain").shape(hills()?));
+    world.insert(Body::fixed().named("terrain").shape(hills()?));
     let mut random = SplitMix64::new(seed);
     let mut number = || random.symmetric() as f32;
     for k in 0..n {
@@ -31,7 +31,7 @@ pub(super) fn terrain(n: usize, height: f32, seed: u64) -> Result<Scene> {
         };
         let [x, z, tilt] = [0.6 * HALF * number(), 0.6 * HALF * number(), 0.3 * number()];
         let body = Body::dynamic().named(format!("{name} {k}")).shape(shape).rotation(about(Vec3::X, tilt));
-        world.add(body.position(x, height + 1.5 + 0.1 * k as f32, z));
+        world.insert(body.position(x, height + 1.5 + 0.1 * k as f32, z));
     }
     let top = height + 2.0 + 0.1 * n as f32;
     let container = Some((Vec3::new(-HALF, -1.0, -HALF), Vec3::new(HALF, top, HALF)));
@@ -60,7 +60,7 @@ pub(super) fn bullets(n: usize, speed: f32, seed: u64) -> Scene {
         let half = side.abs() * SHEET + (Vec3::ONE - side.abs()) * ROOM;
         let at = -(ROOM + SHEET) * side;
         let sheet = Body::fixed().named("sheet").shape(Shape::cuboid(half.x, half.y, half.z)).friction(0.0);
-        world.add(sheet.restitution(1.0).position(at.x, at.y, at.z));
+        world.insert(sheet.restitution(1.0).position(at.x, at.y, at.z));
     }
     let mut random = SplitMix64::new(seed);
     let mut number = || random.symmetric() as f32;
@@ -70,7 +70,7 @@ pub(super) fn bullets(n: usize, speed: f32, seed: u64) -> Scene {
         let way = Vec3::new(number(), number(), number()).normalize_or(Vec3::X);
         let bullet = Body::dynamic().named(format!("bullet {k}")).shape(Shape::ball(0.02)).swept();
         let bullet = bullet.friction(0.0).restitution(1.0).velocity(speed * way, Vec3::ZERO);
-        world.add(bullet.position(place(k), place(k / rows), place(k / rows / rows)));
+        world.insert(bullet.position(place(k), place(k / rows), place(k / rows / rows)));
     }
     let container = Some((Vec3::splat(-ROOM), Vec3::splat(ROOM)));
     Scene { container, ..Scene::new("bullets", world, 300) }

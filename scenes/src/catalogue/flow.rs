@@ -24,7 +24,7 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
     for k in 0..rollers {
         let roller = Body::kinematic().named(format!("roller {k}")).shape(Shape::cylinder(0.5, ROLLER));
         let roller = roller.position(PITCH * k as f32, -ROLLER, 0.0).rotation(about(Vec3::X, FRAC_PI_2));
-        world.add(roller.velocity(Vec3::ZERO, Vec3::NEG_Z * (speed / ROLLER)));
+        world.insert(roller.velocity(Vec3::ZERO, Vec3::NEG_Z * (speed / ROLLER)));
     }
     // A box is three roller distances long, so at least two rollers carry it. Its bottom rises by 1 cm towards both
     // ends: a straight edge would hit each roller a little below its top, and the box would hop by 7 mm at 2 m/s. With
@@ -37,7 +37,7 @@ pub(super) fn conveyor(length: f32, speed: f32, every: u32) -> Result<Scene> {
     }
     let parcel = Body::dynamic().named("box").shape(Shape::convex_hull(&points)?).density(200.0);
     let parcel = parcel.position(1.5 * PITCH, 0.205, 0.0).velocity(Vec3::X * speed, Vec3::ZERO);
-    let first = world.add(parcel.clone());
+    let first = world.insert(parcel.clone());
     let mut scene = Scene::new("conveyor", world, 900);
     scene.leaving.push((first, below(-1.0)));
     scene.spawners.push(Spawner { leaves: below(-1.0), first: every, ..Spawner::new(parcel, every) });
@@ -67,8 +67,8 @@ pub(super) fn belts(n: usize, speed: f32) -> Scene {
             walls = walls.collider(piece(Vec3::new(half_length, 0.3, 0.05), Vec3::new(0.0, 0.2, z), slippery));
         }
     }
-    world.add(belts);
-    world.add(walls);
+    world.insert(belts);
+    world.insert(walls);
     for i in 0..n {
         let (lap, along) = (4 * i / n, 4.0 * i as f32 / n as f32);
         let side = about(Vec3::Y, -FRAC_PI_2 * lap as f32);
@@ -79,7 +79,7 @@ pub(super) fn belts(n: usize, speed: f32) -> Scene {
         } else {
             Body::dynamic().named("box").shape(Shape::cuboid(0.2, 0.2, 0.15)).rotation(side)
         };
-        world.add(body.position(place.x, place.y, place.z));
+        world.insert(body.position(place.x, place.y, place.z));
     }
     Scene::new("belts", world, 900)
 }
@@ -98,7 +98,7 @@ pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     let mut world = World::new();
     let mut board = |name: &str, half: Vec3, at: Vec3| {
         let board = Body::fixed().named(name).shape(Shape::cuboid(half.x, half.y, half.z)).rotation(slope);
-        world.add(board.groups(groups(walls, balls)).position(at.x, at.y, at.z));
+        world.insert(board.groups(groups(walls, balls)).position(at.x, at.y, at.z));
     };
     board("floor", Vec3::new(8.0, 0.1, 0.5 * WIDTH), place(-4.0, -0.1, 0.0));
     for (name, z) in [("left", -0.5 * WIDTH - 0.05), ("right", 0.5 * WIDTH + 0.05)] {
@@ -111,9 +111,9 @@ pub(super) fn turnstile(n: u32, every: u32) -> Scene {
     // Almost no friction: with more, a ball and the wall can jam an arm between them forever.
     let cross = cross.friction(0.02);
     let at = place(0.0, 0.35, 0.5 * WIDTH);
-    let cross = world.add(cross.groups(groups(arms, balls)).position(at.x, at.y, at.z).rotation(slope));
+    let cross = world.insert(cross.groups(groups(arms, balls)).position(at.x, at.y, at.z).rotation(slope));
     for y in [-0.5, 0.5] {
-        world.join(Joint::to_world(cross, Vec3::Y * y, at + slope * Vec3::Y * y));
+        world.insert_joint(Joint::to_world(cross, Vec3::Y * y, at + slope * Vec3::Y * y));
     }
     let at = place(-11.0, BALL + 0.01, 0.0);
     let ball = Body::dynamic().named("ball").shape(Shape::ball(BALL)).density(100.0).groups(groups(balls, u32::MAX));
@@ -143,7 +143,7 @@ pub(super) fn galton(n: u32, rows: usize, every: u32, seed: u64) -> Scene {
     let place = |k: usize, of: usize| PITCH * centered(k, of) as f32;
     let mut world = World::new();
     let mut fixed = |name: &str, [x, y, z]: [f32; 3], at: [f32; 3]| {
-        world.add(Body::fixed().named(name).shape(Shape::cuboid(x, y, z)).position(at[0], at[1], at[2]));
+        world.insert(Body::fixed().named(name).shape(Shape::cuboid(x, y, z)).position(at[0], at[1], at[2]));
     };
     fixed("floor", [half_width + 0.1, 0.1, HALF_DEPTH + 0.1], [0.0, -0.1, 0.0]);
     for (name, z) in [("back", -HALF_DEPTH - 0.05), ("glass", HALF_DEPTH + 0.05)] {
@@ -166,14 +166,14 @@ pub(super) fn galton(n: u32, rows: usize, every: u32, seed: u64) -> Scene {
             pins = pins.shape_at(Shape::cylinder(HALF_DEPTH, PIN), at, lying);
         }
     }
-    world.add(pins);
+    world.insert(pins);
     for k in 0..bins {
         let half = Vec3::new(0.5 * PITCH - 0.02, 0.5 * rim - 0.1, HALF_DEPTH);
         let bin = Body::fixed().named(format!("bin {}", k + 1)).sensor(Shape::cuboid(half.x, half.y, half.z));
-        world.add(bin.position(place(k, bins), half.y, 0.0));
+        world.insert(bin.position(place(k, bins), half.y, 0.0));
     }
     let across = Body::fixed().named("gate").sensor(Shape::cuboid(half_width, 0.05, HALF_DEPTH));
-    world.add(across.position(0.0, gate, 0.0));
+    world.insert(across.position(0.0, gate, 0.0));
 
     let corner = Vec3::new(half_width, 0.0, HALF_DEPTH);
     let mut scene = Scene::new("galton", world, n * every + 300);

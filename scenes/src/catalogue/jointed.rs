@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::common::centered;
 use crate::scene::Scene;
 use drystone::stages::math::rotation::about;
-use drystone::{Body, Joint, Shape, World};
+use drystone::{Body, BodyHandle, Joint, Shape, World};
 
 /// A ball at the end of `length` (m), lifted by `degrees` from its hanging position. Its radius is a tenth of the
 /// length, so its period is 0.2 % longer than that of a point mass.
@@ -14,8 +14,8 @@ pub(super) fn pendulum(length: f32, degrees: f32) -> Scene {
     let turn = about(Vec3::Z, degrees.to_radians());
     let Vec3 { x, y, z } = turn * (-length * Vec3::Y);
     let ball =
-        world.add(Body::dynamic().named("ball").shape(Shape::ball(0.1 * length)).rotation(turn).position(x, y, z));
-    world.join(Joint::to_world(ball, length * Vec3::Y, Vec3::ZERO));
+        world.insert(Body::dynamic().named("ball").shape(Shape::ball(0.1 * length)).rotation(turn).position(x, y, z));
+    world.insert_joint(Joint::to_world(ball, length * Vec3::Y, Vec3::ZERO));
     Scene::new("pendulum", world, 600)
 }
 
@@ -28,13 +28,14 @@ pub(super) fn chain(links: usize, ratio: f32, degrees: f32) -> Scene {
     let turn = about(Vec3::Z, degrees.to_radians());
     let along = turn * -Vec3::Y;
     let link = Body::dynamic().shape(Shape::cuboid(0.05, HALF, 0.05)).rotation(turn);
+    let mut above = None;
     let mut hang = |body: Body, half: f32, start: f32| {
         let Vec3 { x, y, z } = along * (start + half);
-        let index = world.add(body.position(x, y, z));
+        let body = world.insert(body.position(x, y, z));
         let top = half * Vec3::Y;
-        world.join(match index.checked_sub(1) {
-            None => Joint::to_world(index, top, Vec3::ZERO),
-            Some(above) => Joint::new(above, -HALF * Vec3::Y, index, top),
+        world.insert_joint(match above.replace(body) {
+            None => Joint::to_world(body, top, Vec3::ZERO),
+            Some(above) => Joint::new(above, -HALF * Vec3::Y, body, top),
         });
     };
     for k in 0..links {
@@ -59,13 +60,13 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
 
     let mut world = World::new();
     let tower = |x: f32| Body::fixed().named("tower").shape(Shape::cuboid(0.5, 2.0, 1.5)).position(x, -1.95, 0.0);
-    let left = world.add(tower(seam.x - 0.5));
-    let right = world.add(tower(0.5 - seam.x));
+    let left = world.insert(tower(seam.x - 0.5));
+    let right = world.insert(tower(0.5 - seam.x));
     let plank = Body::dynamic().shape(Shape::cuboid(HALF.x, HALF.y, HALF.z));
     // Joins the right side of a body, at this place in its frame, to the left side of the next plank.
-    let join = |world: &mut World, body: usize, side: Vec3, next: usize, next_side: Vec3| {
+    let join = |world: &mut World, body: BodyHandle, side: Vec3, next: BodyHandle, next_side: Vec3| {
         for z in [-0.8, 0.8].map(|z| z * Vec3::Z) {
-            world.join(Joint::new(body, side + z, next, next_side + z));
+            world.insert_joint(Joint::new(body, side + z, next, next_side + z));
         }
     };
     let half_pitch = 0.5 * PITCH * Vec3::X;
@@ -73,9 +74,9 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
     let mut lowest = 0.0_f32;
     for k in 0..planks {
         let Vec3 { x, y, z } = seam + 0.5 * step(k);
-        let index = world.add(plank.clone().position(x, y, z).rotation(slope(k)));
-        join(&mut world, before, side, index, -half_pitch);
-        (before, side) = (index, half_pitch);
+        let next = world.insert(plank.clone().position(x, y, z).rotation(slope(k)));
+        join(&mut world, before, side, next, -half_pitch);
+        (before, side) = (next, half_pitch);
         seam += step(k);
         lowest = lowest.min(seam.y);
     }
@@ -83,11 +84,11 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
 
     for k in 0..boxes {
         // In the middle of a plank, with the boxes evenly spread.
-        let on = right + 1 + (2 * k + 1) * planks / (2 * boxes);
+        let on = right.index() + 1 + (2 * k + 1) * planks / (2 * boxes);
         let Body { position, rotation, .. } = world.bodies[on];
         let Vec3 { x, y, z } = position + rotation * ((HALF.y + 0.2) * Vec3::Y);
         let cube = Body::dynamic().named(format!("box {k}")).shape(Shape::cuboid(0.2, 0.2, 0.2));
-        world.add(cube.position(x, y, z).rotation(rotation));
+        world.insert(cube.position(x, y, z).rotation(rotation));
     }
     let container = Some((Vec3::new(-0.5 * end.x, lowest - 0.5, -HALF.z), Vec3::new(0.5 * end.x, 4.0, HALF.z)));
     Scene { container, ..Scene::new("bridge", world, 600) }
@@ -106,11 +107,11 @@ pub(super) fn grid(n: usize, ratio: f32) -> Scene {
         let (column, row) = (i % n, i / n);
         let place = Vec3::new((centered(column, n) * f64::from(PITCH)) as f32, 0.0, PITCH * (row as f32 + 0.5));
         let density = if i == heavy { 1000.0 * ratio } else { 1000.0 };
-        world.add(ball(density).position(place.x, place.y, place.z));
+        world.insert(ball(density).position(place.x, place.y, place.z));
         if column > 0 {
-            world.join(Joint::new(i - 1, to_x, i, -to_x));
+            world.insert_joint(Joint::new(i - 1, to_x, i, -to_x));
         }
-        world.join(match i.checked_sub(n) {
+        world.insert_joint(match i.checked_sub(n) {
             None => Joint::to_world(i, -to_z, place - to_z),
             Some(above) => Joint::new(above, to_z, i, -to_z),
         });

@@ -7,7 +7,7 @@ use glam::{Quat, Vec3};
 use super::common::floor;
 use crate::scene::Scene;
 use drystone::stages::math::rotation::{about, arc, product};
-use drystone::{Axis, Body, Bounds, Drive, Joint, Linear, MassProperties, Shape, World};
+use drystone::{Axis, Body, BodyHandle, Bounds, Drive, Joint, Linear, MassProperties, Shape, World};
 
 /// A crank, a coupler and a rocker in the plane z = 0. Hinges join them to each other and to two points of the world
 /// 0.5 m apart. A motor turns the crank at `speed` (rad/s).
@@ -28,15 +28,15 @@ pub(super) fn four_bar(speed: f32) -> Scene {
         let (length, Vec3 { x, y, z }) = (from.distance(to), 0.5 * (from + to));
         let turned = arc(Vec3::X, (to - from) / length);
         let bar = Body::dynamic().named(name).shape(Shape::cuboid(0.5 * length, 0.02, 0.02)).rotation(turned);
-        (world.add(bar.position(x, y, z)), 0.5 * length * Vec3::X)
+        (world.insert(bar.position(x, y, z)), 0.5 * length * Vec3::X)
     };
     let (crank, half_crank) = bar("crank", left, top);
     let (coupler, half_coupler) = bar("coupler", top, end);
     let (rocker, half_rocker) = bar("rocker", right, end);
-    world.join(Joint::to_world(crank, -half_crank, left).hinge(Vec3::Z).motor(speed, 100.0));
-    world.join(Joint::new(coupler, -half_coupler, crank, half_crank).hinge(Vec3::Z));
-    world.join(Joint::to_world(rocker, -half_rocker, right).hinge(Vec3::Z));
-    world.join(Joint::new(rocker, half_rocker, coupler, half_coupler).hinge(Vec3::Z));
+    world.insert_joint(Joint::to_world(crank, -half_crank, left).hinge(Vec3::Z).motor(speed, 100.0));
+    world.insert_joint(Joint::new(coupler, -half_coupler, crank, half_crank).hinge(Vec3::Z));
+    world.insert_joint(Joint::to_world(rocker, -half_rocker, right).hinge(Vec3::Z));
+    world.insert_joint(Joint::new(rocker, half_rocker, coupler, half_coupler).hinge(Vec3::Z));
     Scene::new("four-bar", world, 600)
 }
 
@@ -50,21 +50,21 @@ pub(super) fn drawbridge(load: f32) -> Scene {
     const WINCH: (f32, f32) = (-0.4, 2e4);
     let mut world = World::new();
     let tower = Body::fixed().named("tower").shape(Shape::cuboid(0.5, 3.0, 1.5)).position(-0.6, 1.0, 0.0);
-    let tower = world.add(tower);
+    let tower = world.insert(tower);
     let deck =
         Body::dynamic().named("deck").shape(Shape::cuboid(0.5 * LENGTH, 0.1, WIDTH)).density(500.0).friction(1.0);
-    let deck = world.add(deck.position(0.5 * LENGTH, 0.0, 0.0));
+    let deck = world.insert(deck.position(0.5 * LENGTH, 0.0, 0.0));
     let hinge = Joint::new(deck, -0.5 * LENGTH * Vec3::X, tower, Vec3::new(0.6, -1.0, 0.0)).hinge(Vec3::Z);
-    world.join(hinge.limited(0.0, STEEPEST));
+    world.insert_joint(hinge.limited(0.0, STEEPEST));
     for z in [-WIDTH, WIDTH] {
         let (on_deck, on_tower) = (Vec3::new(0.5 * LENGTH, 0.1, z), Vec3::new(0.6, 3.0, z));
         let longest = Vec3::new(LENGTH, 0.1, z).distance(Vec3::new(0.0, 4.0, z));
         let rope = Axis::limited(0.0, longest).motor(WINCH.0, WINCH.1);
-        world.join(Joint::new(deck, on_deck, tower, on_tower).at_distance(rope));
+        world.insert_joint(Joint::new(deck, on_deck, tower, on_tower).at_distance(rope));
     }
     if load > 0.0 {
         let crate_ = Body::dynamic().named("crate").shape(Shape::cuboid(0.3, 0.3, 0.3)).total_mass(load).friction(1.0);
-        world.add(crate_.position(0.8, 0.4, 0.0));
+        world.insert(crate_.position(0.8, 0.4, 0.0));
     }
     Scene::new("drawbridge", world, 600)
 }
@@ -82,35 +82,35 @@ pub(super) fn car(speed: f32, inside: f32) -> Scene {
     for k in 0..8 {
         let bump = Body::fixed().named("bump").shape(Shape::cylinder(5.0, 0.5)).friction(1.0);
         let lies = about(Vec3::X, FRAC_PI_2);
-        world.add(bump.rotation(lies).position(8.0 + 3.0 * k as f32, -0.44, 0.0));
+        world.insert(bump.rotation(lies).position(8.0 + 3.0 * k as f32, -0.44, 0.0));
     }
     let half_width = if inside > 0.0 { 0.78 + inside } else { 0.7 };
     let chassis = Body::dynamic().named("chassis").shape(Shape::cuboid(1.8, 0.3, half_width)).total_mass(CHASSIS);
-    let chassis = world.add(chassis.position(0.0, 0.75, 0.0));
+    let chassis = world.insert(chassis.position(0.0, 0.75, 0.0));
     let omega = TAU * RIDE.0;
     let sag = 9.81 / (omega * omega);
     let (stiffness, damping) = (0.25 * CHASSIS * omega * omega, 0.5 * CHASSIS * omega * RIDE.1);
     for (x, z) in [(1.3, -0.9), (1.3, 0.9), (-1.3, -0.9), (-1.3, 0.9)] {
         let turned = about(Vec3::X, FRAC_PI_2);
         let wheel = Body::dynamic().named("wheel").shape(Shape::cylinder(0.12, RADIUS)).total_mass(WHEEL).friction(1.0);
-        let wheel = world.add(wheel.rotation(turned).position(x, RADIUS, z));
+        let wheel = world.insert(wheel.rotation(turned).position(x, RADIUS, z));
         let spring = Axis::limited(-0.15, 0.15).spring_damper(-sag, stiffness, damping, f32::MAX);
         let spin = if x < 0.0 { Axis::FREE.motor(-speed / RADIUS, 800.0) } else { Axis::FREE };
         let place = Vec3::new(x, RADIUS - 0.75, z);
-        let joint = |body: usize| Joint::new(body, Vec3::ZERO, chassis, place).along(Vec3::Z);
+        let joint = |body: BodyHandle| Joint::new(body, Vec3::ZERO, chassis, place).along(Vec3::Z);
         if inside > 0.0 {
             // The wheel has its own axle, so it collides with the chassis.
             let mass = 0.5 * WHEEL;
             let axle =
                 MassProperties { mass, principal_inertia: Vec3::splat(0.02 * mass), ..MassProperties::IMMOVABLE };
-            let axle = world.add(Body::dynamic().named("axle").mass_properties(axle).position(x, RADIUS, z));
-            world.join(joint(axle).generic([Axis::LOCKED, spring, Axis::LOCKED], [Axis::LOCKED; 3]));
+            let axle = world.insert(Body::dynamic().named("axle").mass_properties(axle).position(x, RADIUS, z));
+            world.insert_joint(joint(axle).generic([Axis::LOCKED, spring, Axis::LOCKED], [Axis::LOCKED; 3]));
             let hinge = Joint::new(wheel, Vec3::ZERO, axle, Vec3::ZERO).along(Vec3::Z).zero_at(turned, Quat::IDENTITY);
-            world.join(hinge.generic([Axis::LOCKED; 3], [spin, Axis::LOCKED, Axis::LOCKED]));
+            world.insert_joint(hinge.generic([Axis::LOCKED; 3], [spin, Axis::LOCKED, Axis::LOCKED]));
             continue;
         }
         let joint = joint(wheel).zero_at(turned, Quat::IDENTITY);
-        world.join(joint.generic([Axis::LOCKED, spring, Axis::LOCKED], [spin, Axis::LOCKED, Axis::LOCKED]));
+        world.insert_joint(joint.generic([Axis::LOCKED, spring, Axis::LOCKED], [spin, Axis::LOCKED, Axis::LOCKED]));
     }
     Scene::new("car", world, 600)
 }
@@ -164,11 +164,11 @@ pub(super) fn ragdoll(n: usize) -> Scene {
     let mut world = floor(12.0, half_width);
     let height = RISE * STEPS as f32;
     let landing = Shape::cuboid(1.0, 0.5 * height, half_width);
-    world.add(Body::fixed().named("landing").shape(landing).position(-1.0, 0.5 * height, 0.0));
+    world.insert(Body::fixed().named("landing").shape(landing).position(-1.0, 0.5 * height, 0.0));
     for k in 1..STEPS {
         let half = 0.5 * (height - RISE * k as f32);
         let step = Body::fixed().named(format!("step {k}")).shape(Shape::cuboid(0.5 * TREAD, half, half_width));
-        world.add(step.position(TREAD * (k as f32 - 0.5), half, 0.0));
+        world.insert(step.position(TREAD * (k as f32 - 0.5), half, 0.0));
     }
     for i in 0..n {
         let feet = Vec3::new(-0.3, height + 0.01, 1.6 * (i as f32 - 0.5 * (n as f32 - 1.0)));
@@ -188,17 +188,18 @@ fn add_ragdoll(
     velocity: impl Fn(f32) -> Vec3,
     axes: impl Fn(&str) -> [Axis; 3],
 ) {
-    let first = world.bodies.len();
+    let mut parts = Vec::new();
     for (name, middle, half, radius, held) in PARTS {
         let Vec3 { x, y, z } = place(Vec3::from(middle));
         let body = Body::dynamic().named(name).shape(Shape::capsule(half, radius)).density(1000.0).rotation(turn);
-        let body = world.add(body.position(x, y, z).velocity(velocity(y), Vec3::ZERO));
+        let body = world.insert(body.position(x, y, z).velocity(velocity(y), Vec3::ZERO));
+        parts.push(body);
         let Some((holder, at)) = held else { continue };
-        let at = place(Vec3::from(at));
-        let on = |body: usize| turn.inverse() * (at - world.bodies[body].position);
-        let joint = Joint::new(body, on(body), first + holder, on(first + holder)).along(Vec3::Z);
+        let (holder, at) = (parts[holder], place(Vec3::from(at)));
+        let on = |body: BodyHandle| turn.inverse() * (at - world.bodies[body].position);
+        let joint = Joint::new(body, on(body), holder, on(holder)).along(Vec3::Z);
         let locked = Linear::Axes([Axis::LOCKED; 3]);
-        world.join(Joint { linear: locked, angular: axes(name), ..joint });
+        world.insert_joint(Joint { linear: locked, angular: axes(name), ..joint });
     }
 }
 
@@ -223,8 +224,8 @@ pub(super) fn ragdolls(n: usize) -> Scene {
 pub(super) fn press(depth: f32) -> Scene {
     let mut world = floor(5.0, 5.0);
     let block = |body: Body| body.shape(Shape::cuboid(0.5, 0.5, 0.5));
-    world.add(block(Body::dynamic()).named("crate").density(1000.0).position(0.0, 0.5, 0.0));
-    world.add(block(Body::kinematic()).named("press").position(0.0, 1.5 - depth, 0.0));
+    world.insert(block(Body::dynamic()).named("crate").density(1000.0).position(0.0, 0.5, 0.0));
+    world.insert(block(Body::kinematic()).named("press").position(0.0, 1.5 - depth, 0.0));
     Scene::new("press", world, 600)
 }
 

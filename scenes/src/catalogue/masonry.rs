@@ -58,7 +58,7 @@ impl Ring {
             let angle = (2 * k + 1) as f64 * self.half();
             let (dx, dy) = (self.radius * libm::cos(angle), GAP / 2.0 + self.radius * libm::sin(angle));
             let place = wedge.clone().position((x + dx) as f32, (y + dy) as f32, 0.0);
-            world.add(place.rotation(about(Vec3::Z, angle as f32)));
+            world.insert(place.rotation(about(Vec3::Z, angle as f32)));
         }
         Ok(())
     }
@@ -76,7 +76,7 @@ pub(super) fn arch_of(voussoirs: usize, thickness: f64, friction: f32) -> Result
     let mut world = floor(20.0, 10.0);
     let springer = Body::fixed().named("springer").shape(Shape::cuboid((thickness * ring.radius) as f32, 0.5, 1.0));
     for x in [5.0, -5.0] {
-        world.add(springer.clone().friction(friction).position(x, 0.5, 0.0));
+        world.insert(springer.clone().friction(friction).position(x, 0.5, 0.0));
     }
     ring.add_to(&mut world, 0.0, 1.0)?;
     Ok(Scene::new("arch", world, 600).standing())
@@ -101,12 +101,12 @@ pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
         if pier == 0 || pier == arches {
             // Tall enough to hold the foot of the outermost arch.
             let half = springing / 2.0;
-            world.add(block(Body::fixed().named("abutment"), half).position(x as f32, half as f32, 0.0));
+            world.insert(block(Body::fixed().named("abutment"), half).position(x as f32, half as f32, 0.0));
             continue;
         }
         for k in 0..BLOCKS {
             let y = GAP + (BLOCK + GAP) * k as f64 + BLOCK / 2.0;
-            world.add(block(Body::dynamic().named("pier"), BLOCK / 2.0).position(x as f32, y as f32, 0.0));
+            world.insert(block(Body::dynamic().named("pier"), BLOCK / 2.0).position(x as f32, y as f32, 0.0));
         }
     }
     for arch in 0..arches {
@@ -120,7 +120,7 @@ pub(super) fn aqueduct(arches: usize) -> Result<Scene> {
         .friction(STONE);
     for k in 1..arches {
         let (x, y) = (centered(k, arches + 1) * pitch, springing + ring.crown() + GAP + SLAB);
-        world.add(slab.clone().position(x as f32, y as f32, 0.0));
+        world.insert(slab.clone().position(x as f32, y as f32, 0.0));
     }
     Ok(Scene::new("aqueduct", world, 600).standing())
 }
@@ -140,7 +140,7 @@ pub(super) fn planks(name: &str, storeys: usize, half: Vec3, pitch: f64) -> Scen
     for storey in 0..storeys {
         let base = storey as f64 * storey_height;
         let at = |k: usize| (centered(k, 3) * pitch) as f32;
-        let mut put = |own: Vec3, x: f32, y: f64, z: f32| world.add(plank(own).position(x, (base + y) as f32, z));
+        let mut put = |own: Vec3, x: f32, y: f64, z: f32| world.insert(plank(own).position(x, (base + y) as f32, z));
         let lying = 2.0 * f64::from(half.z) + f64::from(half.x);
         for i in 0..3 {
             for j in 0..3 {
@@ -177,7 +177,7 @@ pub(super) fn card_house(storeys: usize, degrees: f64, mu: f32, length: f64, thi
     world.bodies[0].material.friction = mu;
     for storey in 0..storeys {
         let (pairs, base) = (storeys - storey, storey as f64 * (rise + thickness));
-        let mut place = |body: Body, x: f64, y: f64| world.add(body.position(x as f32, (base + y) as f32, 0.0));
+        let mut place = |body: Body, x: f64, y: f64| world.insert(body.position(x as f32, (base + y) as f32, 0.0));
         for k in 0..pairs {
             let ridge = centered(k, pairs) * pitch;
             for side in [-1.0, 1.0] {
@@ -203,7 +203,7 @@ pub(super) fn domino_row(name: &str, n: usize, half: Vec3, pitch: f64, push: f32
     let mut world = floor((n as f64 * pitch / 2.0) as f32 + 10.0, 10.0);
     let domino = Body::dynamic().shape(Shape::cuboid(half.x, half.y, half.z));
     for k in 0..n {
-        world.add(domino.clone().position((centered(k, n) * pitch) as f32, half.y, 0.0));
+        world.insert(domino.clone().position((centered(k, n) * pitch) as f32, half.y, 0.0));
     }
     let spin = -push * Vec3::Z;
     world.bodies[1].angular_velocity = spin;
@@ -218,7 +218,7 @@ pub(super) fn pyramid_heavy(base: usize, ratio: f32) -> Scene {
     scene.name = "pyramid-heavy".to_owned();
     scene.steps = 600;
     let top = unit_box().named("heavy").density(1000.0 * ratio);
-    scene.world.add(top.position(0.0, base as f32 + 0.5, 0.0));
+    scene.world.insert(top.position(0.0, base as f32 + 0.5, 0.0));
     scene
 }
 

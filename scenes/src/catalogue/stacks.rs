@@ -10,7 +10,7 @@ use drystone::{Body, Shape, World};
 pub(super) fn stack(world: &mut World, n: usize, gap: f32, mut cube: impl FnMut(usize) -> ([f32; 2], f32)) {
     for k in 0..n {
         let ([x, z], density) = cube(k);
-        world.add(unit_box().density(density).position(x, k as f32 + 0.5 + lifted(k, gap), z));
+        world.insert(unit_box().density(density).position(x, k as f32 + 0.5 + lifted(k, gap), z));
     }
 }
 
@@ -37,7 +37,7 @@ pub(super) fn coins(n: usize) -> Scene {
     let mut world = floor(20.0, 20.0);
     let coin = Body::dynamic().shape(Shape::cylinder(HALF, 0.5));
     for k in 0..n {
-        world.add(coin.clone().position(0.0, (2 * k + 1) as f32 * HALF, 0.0));
+        world.insert(coin.clone().position(0.0, (2 * k + 1) as f32 * HALF, 0.0));
     }
     Scene::new("coins", world, 600).standing()
 }

@@ -29,7 +29,7 @@ pub(super) fn vehicle(speed: f32, degrees: f32, hills: f32, load: f32, mu: f32) 
     let turn = Turn { speed, steering: degrees.to_radians() };
     let mut world = World::new();
     let size = Vec3::new(2.0 * HALF, 1.0, 2.0 * HALF);
-    world.add(Body::fixed().named("terrain").shape(Shape::height_field(&heights(hills), size)?).friction(mu));
+    world.insert(Body::fixed().named("terrain").shape(Shape::height_field(&heights(hills), size)?).friction(mu));
     let mut chassis = Body::dynamic().named("chassis").shape(Shape::cuboid(1.8, 0.3, 0.7)).total_mass(CHASSIS);
     if load > 0.0 {
         chassis = chassis.additional_mass(MassProperties::point(load, Vec3::ZERO));
@@ -42,14 +42,14 @@ pub(super) fn vehicle(speed: f32, degrees: f32, hills: f32, load: f32, mu: f32) 
     let turned = about(Vec3::X, FRAC_PI_2);
     for (x, z) in PLACES {
         let wheel = Body::dynamic().named("wheel").shape(Shape::cylinder(0.12, RADIUS)).total_mass(WHEEL).friction(mu);
-        let wheel = world.add(wheel.rotation(turned).position(x, RADIUS, z));
+        let wheel = world.insert(wheel.rotation(turned).position(x, RADIUS, z));
         let spring = Axis::limited(-0.25, 0.25).spring_damper(-sag, stiffness, damping, f32::MAX);
         let (angle, spin) = turn.of_wheel((x, z));
         let steer = if x > 0.0 { Axis::limited(angle, angle) } else { Axis::LOCKED };
         let place = Vec3::new(x, RADIUS - HEIGHT, z);
         let joint = Joint::new(wheel, Vec3::ZERO, chassis, place).along(Vec3::Z).zero_at(turned, Quat::IDENTITY);
         let spin = Axis::FREE.motor(spin, TORQUE);
-        world.join(joint.generic([Axis::LOCKED, spring, Axis::LOCKED], [spin, steer, Axis::LOCKED]));
+        world.insert_joint(joint.generic([Axis::LOCKED, spring, Axis::LOCKED], [spin, steer, Axis::LOCKED]));
     }
     Ok(Scene { driver: Some(Driver::vehicle(driven)), ..Scene::new("vehicle", world, 600) })
 }

@@ -30,14 +30,13 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
     for (index, body_file) in file.bodies.into_iter().enumerate() {
         let of_body = |e: Error| e.within(body_label(index, body_file.name.as_deref()));
         let built = body(&body_file).map_err(of_body)?;
-        if let Some(file) = &body_file.leaves {
-            leaving.push((index, leaves(file).map_err(of_body)?));
-        }
-        world.add(built.named(body_file.name.unwrap_or_else(|| format!("body {index}"))));
+        let leaves = body_file.leaves.as_ref().map(leaves).transpose().map_err(of_body)?;
+        let handle = world.insert(built.named(body_file.name.unwrap_or_else(|| format!("body {index}"))));
+        leaving.extend(leaves.map(|leaves| (handle, leaves)));
     }
     for (index, joint_file) in file.joints.iter().enumerate() {
         let joint = joint(joint_file, &world).map_err(|e| e.within(format_args!("joints[{index}]")))?;
-        world.join(joint);
+        world.insert_joint(joint);
     }
     let spawner = |(k, s): (usize, &SpawnerFile)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));
     let spawners = file.spawners.iter().enumerate().map(spawner).collect::<Result<_>>()?;

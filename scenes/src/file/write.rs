@@ -18,10 +18,11 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
     let world = &scene.world;
     let worlds = world.world_count();
     ensure(worlds == 1, || format!("a scene file has room for one world, but this scene has {worlds}"))?;
-    if let Some(i) = world.first_non_finite() {
+    if let Some(body) = world.first_non_finite() {
         return Err(input!(
-            "body {i} {:?}: its numbers are not finite: a scene file cannot represent them",
-            world.bodies[i].name
+            "body {} {:?}: its numbers are not finite: a scene file cannot represent them",
+            body.index(),
+            world.bodies[body].name
         ));
     }
     world.check_joints()?;
@@ -31,7 +32,7 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
         let i = handle.index();
         index_of[i] = bodies.len();
         let of_body = |e: Error| e.within(format_args!("body {i} {:?}", world.bodies[i].name));
-        let leaves = scene.leaving.iter().find(|(body, _)| *body == i).map(|(_, leaves)| *leaves);
+        let leaves = scene.leaving.iter().find(|(body, _)| *body == handle).map(|(_, leaves)| *leaves);
         bodies.push(body(&world.bodies[i], leaves).map_err(of_body)?);
     }
     let of_spawner = |(k, s): (usize, &Spawner)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));

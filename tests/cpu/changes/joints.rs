@@ -21,7 +21,7 @@ fn joints_that_take_the_place_of_others_hold_what_they_tie() {
         joints.retain(|j| j.body_b.is_some());
         for corner in [0, 3] {
             let at = simulation.world.bodies[corner + 12].position;
-            simulation.world.join(Joint::to_world(corner + 12, Vec3::ZERO, at));
+            simulation.world.insert_joint(Joint::to_world(corner + 12, Vec3::ZERO, at));
         }
         assert_eq!(simulation.world.joints.len(), count);
         for step in 0..120 {
@@ -69,9 +69,9 @@ fn whether_jointed_bodies_collide_may_change() {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
     // Two balls that overlap, tied at their centers by a joint of no length.
-    let a = world.add(Body::dynamic().shape(Shape::ball(0.5)));
-    let b = world.add(Body::dynamic().shape(Shape::ball(0.5)).position(0.6, 0.0, 0.0));
-    world.join(Joint::new(a, Vec3::new(0.3, 0.0, 0.0), b, Vec3::new(-0.3, 0.0, 0.0)));
+    let a = world.insert(Body::dynamic().shape(Shape::ball(0.5)));
+    let b = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.6, 0.0, 0.0));
+    world.insert_joint(Joint::new(a, Vec3::new(0.3, 0.0, 0.0), b, Vec3::new(-0.3, 0.0, 0.0)));
     for backend in BOTH {
         let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), backend);
         assert_eq!(simulation.step(DT).expect("a step").manifolds, 0);
@@ -106,10 +106,10 @@ fn a_changed_joint_wakes_only_what_it_holds() {
     let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
     let mut world = World::new();
     for x in [0.0, 5.0] {
-        let upper = world.add(cube(x, -1.0, 0.0));
-        let lower = world.add(cube(x, -2.5, 0.0));
-        world.join(Joint::to_world(upper, Vec3::Y, Vec3::new(x, 0.0, 0.0)));
-        world.join(Joint::new(upper, -0.75 * Vec3::Y, lower, 0.75 * Vec3::Y));
+        let upper = world.insert(cube(x, -1.0, 0.0));
+        let lower = world.insert(cube(x, -2.5, 0.0));
+        world.insert_joint(Joint::to_world(upper, Vec3::Y, Vec3::new(x, 0.0, 0.0)));
+        world.insert_joint(Joint::new(upper, -0.75 * Vec3::Y, lower, 0.75 * Vec3::Y));
     }
     let mut simulation = simulation(&world, &config, cpu);
     let asleep = |s: &Simulation| [0, 1, 2, 3].map(|i| s.is_asleep(i));
@@ -138,7 +138,7 @@ fn a_new_joint_wakes_both_of_its_bodies() {
         let [a, b] = if swap { [other, one] } else { [one, other] };
         let at = |i: usize| simulation.world.bodies[i].position;
         let half = 0.5 * (at(b) - at(a));
-        simulation.world.join(Joint::new(a, half, b, -half));
+        simulation.world.insert_joint(Joint::new(a, half, b, -half));
         run(&mut simulation, 1);
         assert!(!simulation.is_asleep(one) && !simulation.is_asleep(other));
     }
@@ -147,11 +147,11 @@ fn a_new_joint_wakes_both_of_its_bodies() {
 #[test]
 fn a_body_that_is_untied_rests_on_a_half_space() {
     let mut world = World::new();
-    let ground = world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let ground = world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     // It moves while it is tied, so that its box was below the surface before as well.
     let ball = Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.49, 0.0).velocity(Vec3::X, Vec3::ZERO);
-    let ball = world.add(ball);
-    world.join(Joint::new(ball, Vec3::ZERO, ground, 0.49 * Vec3::Y).slider(Vec3::X));
+    let ball = world.insert(ball);
+    world.insert_joint(Joint::new(ball, Vec3::ZERO, ground, 0.49 * Vec3::Y).slider(Vec3::X));
     let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
     run(&mut simulation, 10);
     assert_eq!(simulation.step(DT).expect("a step").manifolds, 0);

@@ -44,24 +44,27 @@ fn cube(x: f32, y: f32, z: f32) -> Body {
 /// points.
 fn standing() -> World {
     let mut world = World::new();
-    world.add(ground());
+    world.insert(ground());
     for tower in 0..3 {
         for level in 0..5 {
             let offset = 0.05 * ((tower + level) % 2) as f32;
-            world.add(cube(3.0 * tower as f32 + offset, 0.5 + level as f32, 0.0));
+            world.insert(cube(3.0 * tower as f32 + offset, 0.5 + level as f32, 0.0));
         }
     }
     let tilt = Quat::from_rotation_z(0.2);
     let up = tilt * Vec3::Y;
     let at = Vec3::new(-8.0, 3.0, 0.0);
-    world.add(Body::fixed().shape(Shape::cuboid(3.0, 0.5, 3.0)).position(at.x, at.y, at.z).rotation(tilt));
+    world.insert(Body::fixed().shape(Shape::cuboid(3.0, 0.5, 3.0)).position(at.x, at.y, at.z).rotation(tilt));
     let block = at + up * 0.75;
-    world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.5)).position(block.x, block.y, block.z).rotation(tilt));
+    world.insert(
+        Body::dynamic().shape(Shape::cuboid(0.5, 0.25, 0.5)).position(block.x, block.y, block.z).rotation(tilt),
+    );
     let mut above = None;
     for i in 0..6 {
-        let rod = world.add(Body::dynamic().shape(Shape::cuboid(0.25, 0.5, 0.25)).position(12.0, 8.0 - i as f32, 0.0));
+        let rod =
+            world.insert(Body::dynamic().shape(Shape::cuboid(0.25, 0.5, 0.25)).position(12.0, 8.0 - i as f32, 0.0));
         let end = Vec3::new(0.0, 0.5, 0.0);
-        world.join(match above {
+        world.insert_joint(match above {
             None => Joint::to_world(rod, end, Vec3::new(12.0, 8.5, 0.0)),
             Some(above) => Joint::new(above, -end, rod, end),
         });
@@ -78,18 +81,18 @@ fn net() -> World {
     let mut world = World::new();
     let ball = |x: u32, z: u32| Body::dynamic().shape(Shape::ball(0.2)).position(x as f32, 0.0, z as f32);
     for i in 0..16 {
-        world.add(ball(i % 4, i / 4));
+        world.insert(ball(i % 4, i / 4));
     }
     let half = 0.5 * Vec3::X;
     for i in 0..16 {
         if i % 4 < 3 {
-            world.join(Joint::new(i, half, i + 1, -half));
+            world.insert_joint(Joint::new(i, half, i + 1, -half));
         }
         if i < 12 {
-            world.join(Joint::new(i, 0.5 * Vec3::Z, i + 4, -0.5 * Vec3::Z));
+            world.insert_joint(Joint::new(i, 0.5 * Vec3::Z, i + 4, -0.5 * Vec3::Z));
         }
     }
-    world.join(Joint::to_world(0, Vec3::ZERO, Vec3::ZERO));
-    world.join(Joint::to_world(3, Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)));
+    world.insert_joint(Joint::to_world(0, Vec3::ZERO, Vec3::ZERO));
+    world.insert_joint(Joint::to_world(3, Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)));
     world
 }

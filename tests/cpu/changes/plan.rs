@@ -80,7 +80,7 @@ fn a_plan_is_always_that_of_its_problem() {
     let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
     let mut world = standing();
     // A ball that comes down after the rest fell asleep, and bounces; cubes and balls turn without a gyroscopic pass.
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(-20.0, 60.0, 0.0).restitution(0.8));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.3)).position(-20.0, 60.0, 0.0).restitution(0.8));
     let mut simulation = simulation(&world, &config, cpu);
     let (mut plans, mut steps) = (Vec::new(), 0);
     for step in 0..420 {
@@ -115,9 +115,9 @@ fn assert_planned_anew(simulation: &mut Simulation, colors: &[u32]) {
 #[test]
 fn a_plan_follows_contacts_and_lengths_of_steps_where_its_colors_stay() {
     let mut world = World::new();
-    world.add(ground());
-    let cube = world.add(cube(0.0, 0.5, 0.0));
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 9.0, 0.0).restitution(0.5));
+    world.insert(ground());
+    let cube = world.insert(cube(0.0, 0.5, 0.0));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 9.0, 0.0).restitution(0.5));
     let mut simulation = simulation(&world, &SolverConfig::default().without_sleep(), cpu);
     run(&mut simulation, 10);
     let colors = simulation.problem().colors.clone();
@@ -137,10 +137,10 @@ fn a_plan_follows_contacts_and_lengths_of_steps_where_its_colors_stay() {
 #[test]
 fn a_plan_follows_spins_where_its_colors_stay() {
     let mut world = World::new();
-    let rod = world.add(Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1)).position(0.0, -0.5, 0.0));
-    world.join(Joint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
-    let ball = world.add(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 0.0, 0.0));
-    world.join(Joint::to_world(ball, Vec3::ZERO, Vec3::new(5.0, 0.0, 0.0)));
+    let rod = world.insert(Body::dynamic().shape(Shape::cuboid(0.1, 0.5, 0.1)).position(0.0, -0.5, 0.0));
+    world.insert_joint(Joint::to_world(rod, Vec3::new(0.0, 0.5, 0.0), Vec3::ZERO));
+    let ball = world.insert(Body::dynamic().shape(Shape::ball(0.3)).position(5.0, 0.0, 0.0));
+    world.insert_joint(Joint::to_world(ball, Vec3::ZERO, Vec3::new(5.0, 0.0, 0.0)));
     let mut simulation = simulation(&world, &SolverConfig::default().with(|c| c.sleep_after = 0.3), cpu);
     for _ in 0..60 {
         simulation.world.bodies[ball].linear_velocity.y = 0.1;

@@ -10,8 +10,8 @@ use super::{DT, ball, cube, empty, floor, near, run, simulation};
 fn what_comes_fast_stops_at_the_surface() {
     let way = 0.9;
     let mut world = empty();
-    world.add(Body::fixed().shape(Shape::cuboid(0.5, 5.0, 5.0)));
-    world.add(ball().position(-1.0 - 1.9 * way, 0.0, 0.0).velocity(Vec3::X * way / DT, Vec3::ZERO));
+    world.insert(Body::fixed().shape(Shape::cuboid(0.5, 5.0, 5.0)));
+    world.insert(ball().position(-1.0 - 1.9 * way, 0.0, 0.0).velocity(Vec3::X * way / DT, Vec3::ZERO));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     for (step, gap) in [(1, 0.9 * way), (2, 0.0), (3, 0.0)] {
         run(&mut simulation, 1, DT);
@@ -24,8 +24,8 @@ fn what_comes_fast_stops_at_the_surface() {
 #[test]
 fn a_pair_says_how_far_its_surfaces_are_apart_whatever_they_are_preloaded_by() {
     let mut world = World::new();
-    world.add(floor());
-    world.add(cube());
+    world.insert(floor());
+    world.insert(cube());
     let mut simulation = simulation(world, SolverConfig::default().without_sleep().with(|c| c.substeps = 2));
     for _ in 0..5 {
         run(&mut simulation, 60, DT);
@@ -43,8 +43,8 @@ fn a_pair_says_how_far_its_surfaces_are_apart_whatever_they_are_preloaded_by() {
 #[test]
 fn bodies_that_part_are_no_pair_any_more() {
     let mut world = empty();
-    world.add(ball());
-    world.add(ball().position(1.01, 0.0, 0.0).velocity(Vec3::X * 3.0, Vec3::ZERO));
+    world.insert(ball());
+    world.insert(ball().position(1.01, 0.0, 0.0).velocity(Vec3::X * 3.0, Vec3::ZERO));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     assert_eq!(run(&mut simulation, 1, DT).pairs, 1);
     assert_eq!(run(&mut simulation, 60, DT).pairs, 0);
@@ -56,13 +56,13 @@ fn bodies_that_part_are_no_pair_any_more() {
 #[test]
 fn arms_end_midway_between_the_surfaces() {
     let mut world = empty();
-    world.add(floor());
-    world.add(ball().position(0.0, 0.51, 0.0));
+    world.insert(floor());
+    world.insert(ball().position(0.0, 0.51, 0.0));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 1, DT);
     let manifold = simulation.manifolds().next().expect("near enough");
     let point = manifold.points()[0];
-    let bodies = [manifold.body_a, manifold.body_b].map(|b| simulation.world.bodies[b].position);
+    let bodies = [manifold.a, manifold.b].map(|side| simulation.world.bodies[side.body].position);
     for (center, arm) in bodies.into_iter().zip([point.r_a, point.r_b]) {
         near("height of the contact [m]", (center + arm).y, 0.005, 1e-6);
     }
@@ -73,8 +73,8 @@ fn arms_end_midway_between_the_surfaces() {
 fn a_contact_is_computed_anew_once_its_bodies_moved_or_turned() {
     let computed = |velocity: Vec3, spin: Vec3| {
         let mut world = empty();
-        world.add(floor().friction(0.0));
-        world.add(cube().friction(0.0).velocity(velocity, spin));
+        world.insert(floor().friction(0.0));
+        world.insert(cube().friction(0.0).velocity(velocity, spin));
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         run(&mut simulation, 1, DT);
         (1..=30).find(|_| run(&mut simulation, 1, DT).computed > 0)
@@ -95,8 +95,8 @@ fn a_contact_is_computed_anew_once_its_bodies_moved_or_turned() {
 #[test]
 fn what_comes_slowly_and_then_fast_stops_at_the_surface() {
     let mut world = empty();
-    world.add(Body::fixed().shape(Shape::cuboid(0.5, 5.0, 5.0)));
-    world.add(ball().position(-1.06, 0.0, 0.0));
+    world.insert(Body::fixed().shape(Shape::cuboid(0.5, 5.0, 5.0)));
+    world.insert(ball().position(-1.06, 0.0, 0.0));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 2, DT);
     simulation.world.bodies[1].linear_velocity.x = 0.5 / DT;
@@ -112,9 +112,9 @@ fn what_comes_slowly_and_then_fast_stops_at_the_surface() {
 fn what_turns_fast_is_looked_ahead_for() {
     for (spin, manifolds) in [(8.0, 1), (0.0, 0)] {
         let mut world = empty();
-        world.add(floor());
+        world.insert(floor());
         let plank = Body::dynamic().shape(Shape::cuboid(1.0, 0.1, 0.1)).position(0.0, 0.11, 0.0);
-        world.add(plank.velocity(Vec3::ZERO, Vec3::Z * -spin));
+        world.insert(plank.velocity(Vec3::ZERO, Vec3::Z * -spin));
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         assert_eq!(run(&mut simulation, 1, DT).manifolds, manifolds, "{spin} rad/s");
     }
@@ -123,9 +123,9 @@ fn what_turns_fast_is_looked_ahead_for() {
 #[test]
 fn bodies_that_nothing_pushes_are_no_pair() {
     let mut world = World::new();
-    world.add(floor());
+    world.insert(floor());
     for x in [0.0, 0.5] {
-        world.add(Body::kinematic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(x, 0.5, 0.0));
+        world.insert(Body::kinematic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(x, 0.5, 0.0));
     }
     assert_eq!(run(&mut simulation(world, SolverConfig::default().without_sleep()), 1, DT).pairs, 0);
 }
@@ -135,11 +135,11 @@ fn bodies_that_nothing_pushes_are_no_pair() {
 fn a_plank_that_turns_onto_a_board_meets_it() {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
-    world.add(Body::fixed().shape(Shape::cuboid(5.0, 0.02, 5.0)).position(0.0, -0.02, 0.0));
+    world.insert(Body::fixed().shape(Shape::cuboid(5.0, 0.02, 5.0)).position(0.0, -0.02, 0.0));
     let plank = Body::dynamic().shape(Shape::cuboid(1.0, 0.05, 0.1)).position(0.0, 0.3, 0.0);
     // One end is 3 cm above the board, further than contacts are made.
     let plank = plank.rotation(Quat::from_rotation_z(-0.2227)).velocity(Vec3::ZERO, Vec3::new(0.0, 0.0, -8.0));
-    let plank = world.add(plank);
+    let plank = world.insert(plank);
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     let mut lowest = f32::INFINITY;
     for _ in 0..30 {

@@ -11,8 +11,8 @@ use super::{DT, G, bounced, cube, floor, near, on_a_slope, on_a_slope_that_falls
 /// How far a cube slides that begins at 4 m/s [m]; `friction` of the cube and of the ground.
 fn slid(config: SolverConfig, friction: [f32; 2]) -> f32 {
     let mut world = World::new();
-    world.add(floor().friction(friction[1]));
-    world.add(cube().friction(friction[0]).velocity(Vec3::X * 4.0, Vec3::ZERO));
+    world.insert(floor().friction(friction[1]));
+    world.insert(cube().friction(friction[0]).velocity(Vec3::X * 4.0, Vec3::ZERO));
     let mut simulation = simulation(world, config.with(|c| c.substeps = 4));
     run(&mut simulation, 360, 1.0 / 240.0);
     simulation.world.bodies[1].position.x
@@ -86,8 +86,8 @@ fn surfaces_combine_by_the_later_of_their_rules() {
     // In a step: 0.65 of 0.9 and 0.4.
     let mut world = World::new();
     let rough = |friction| Material { friction, friction_rule: Some(Average), ..Material::default() };
-    world.add(floor().friction(0.4));
-    world.add(cube().material(rough(0.9)).velocity(Vec3::X * 4.0, Vec3::ZERO));
+    world.insert(floor().friction(0.4));
+    world.insert(cube().material(rough(0.9)).velocity(Vec3::X * 4.0, Vec3::ZERO));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 360, 1.0 / 240.0);
     let expected = 16.0 / (2.0 * 0.65 * G);
@@ -104,9 +104,9 @@ fn a_shape_has_its_own_friction() {
         ..Collider::new(Shape::cuboid(0.5, 0.05, 0.1))
     };
     let mut world = World::new();
-    world.add(floor().friction(0.9));
+    world.insert(floor().friction(0.9));
     let sled = cube().position(0.0, 0.6, 0.0).collider(runner(-0.4)).collider(runner(0.4)).friction(2.0);
-    let sled = world.add(sled.velocity(Vec3::X * 4.0, Vec3::ZERO));
+    let sled = world.insert(sled.velocity(Vec3::X * 4.0, Vec3::ZERO));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     let speed = |simulation: &Simulation| simulation.world.bodies[sled].linear_velocity.x;
     run(&mut simulation, 60, 1.0 / 240.0);
@@ -131,11 +131,11 @@ fn a_shape_has_its_own_restitution() {
     };
     for (turn, e) in [(0.0, 0.8), (std::f32::consts::PI, 0.3)] {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
-        world.add(floor());
+        world.insert(floor());
         // One end is below the other.
         let upright = Quat::from_rotation_z(turn) * Quat::from_rotation_z(-std::f32::consts::FRAC_PI_2);
         let dumbbell = Body::dynamic().collider(end(0.5, 0.8)).collider(end(-0.5, 0.3)).rotation(upright);
-        world.add(dumbbell.position(0.0, 0.71, 0.0).velocity(Vec3::NEG_Y * 3.0, Vec3::ZERO));
+        world.insert(dumbbell.position(0.0, 0.71, 0.0).velocity(Vec3::NEG_Y * 3.0, Vec3::ZERO));
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         run(&mut simulation, 6, DT);
         near("bounce", simulation.world.bodies[1].linear_velocity.y, 3.0 * e, 1e-3);
@@ -148,8 +148,8 @@ fn a_shape_has_its_own_restitution() {
 fn a_spinning_box_is_braked_by_its_load_times_mu_times_the_distance_of_its_corners() {
     for friction_at in [FrictionAt::Points, FrictionAt::Manifold] {
         let mut world = World::new();
-        world.add(floor().friction(0.4));
-        world.add(cube().friction(0.4));
+        world.insert(floor().friction(0.4));
+        world.insert(cube().friction(0.4));
         let mut simulation =
             simulation(world, SolverConfig::default().without_sleep().with(|c| c.friction_at = friction_at));
         run(&mut simulation, 60, 1.0 / 240.0);
@@ -191,9 +191,9 @@ fn without_warm_start_a_step_begins_without_impulses() {
 #[test]
 fn slip_friction_acts_against_the_slip() {
     let mut world = World::new();
-    world.add(floor().friction(0.4));
+    world.insert(floor().friction(0.4));
     let direction = Vec3::new(0.6, 0.0, 0.8);
-    world.add(cube().friction(0.4).velocity(direction * 4.0, Vec3::ZERO));
+    world.insert(cube().friction(0.4).velocity(direction * 4.0, Vec3::ZERO));
     let config = SolverConfig::default().without_sleep().with(|c| c.rules.slip_friction = true);
     let mut simulation = simulation(world, config);
     run(&mut simulation, 120, 1.0 / 240.0);

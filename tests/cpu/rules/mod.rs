@@ -57,10 +57,10 @@ fn near(what: &str, measured: f32, expected: f32, tolerance: f32) {
 /// Velocity of a ball upwards after it met the floor at `speed`; `restitution` of the ball and of the floor.
 fn bounced(speed: f32, restitution: [f32; 2]) -> f32 {
     let mut world = empty();
-    world.add(floor().restitution(restitution[1]));
+    world.insert(floor().restitution(restitution[1]));
     let approach = Vec3::NEG_Y * speed;
     let thrown = ball().restitution(restitution[0]).position(0.0, 0.51, 0.0).velocity(approach, Vec3::ZERO);
-    world.add(thrown);
+    world.insert(thrown);
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 6, DT);
     simulation.world.bodies[1].linear_velocity.y
@@ -75,8 +75,8 @@ fn on_a_slope(config: SolverConfig) -> Simulation {
 fn on_a_slope_that_falls(turn: Quat, config: SolverConfig) -> Simulation {
     let mut world = World::new();
     world.gravity = turn * Quat::from_rotation_z(FRAC_PI_6) * Vec3::NEG_Y * G;
-    world.add(floor().friction(0.7));
-    world.add(cube().friction(0.7));
+    world.insert(floor().friction(0.7));
+    world.insert(cube().friction(0.7));
     let mut simulation = simulation(world, config);
     run(&mut simulation, 60, DT);
     simulation

@@ -20,8 +20,8 @@ fn a_ball_bounces_only_if_it_comes_faster_than_the_threshold() {
 fn a_joint_is_the_damped_spring_that_its_settings_say() {
     for (frequency, damping) in [(0.02, 0.3), (0.02, 3.0), (0.1, 0.1)] {
         let mut world = empty();
-        let hung = world.add(ball().position(0.1, 0.0, 0.0));
-        world.join(Joint::to_world(hung, Vec3::ZERO, Vec3::ZERO));
+        let hung = world.insert(ball().position(0.1, 0.0, 0.0));
+        world.insert_joint(Joint::to_world(hung, Vec3::ZERO, Vec3::ZERO));
         let h = DT / 4.0;
         let config = SolverConfig::default().without_sleep().with(|c| {
             c.substeps = 4;
@@ -51,8 +51,8 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
 fn a_ball_bounces_to_the_square_of_its_restitution() {
     for e in [0.5, 0.9] {
         let mut world = World::new();
-        world.add(floor());
-        world.add(ball().restitution(e).position(0.0, 2.5, 0.0));
+        world.insert(floor());
+        world.insert(ball().restitution(e).position(0.0, 2.5, 0.0));
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         let (mut highest, mut bounced) = (0.0_f32, false);
         for _ in 0..600 {
@@ -72,8 +72,8 @@ fn a_ball_bounces_to_the_square_of_its_restitution() {
 #[test]
 fn what_was_pressed_in_the_step_before_does_not_bounce() {
     let mut world = World::new();
-    world.add(floor().restitution(0.5));
-    world.add(ball().restitution(0.5).position(0.0, 0.5, 0.0));
+    world.insert(floor().restitution(0.5));
+    world.insert(ball().restitution(0.5).position(0.0, 0.5, 0.0));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 60, DT);
     let problem = simulation.next_problem(DT).expect("a step").0;
@@ -87,8 +87,8 @@ fn a_body_hung_by_its_center_of_mass_does_not_turn() {
     let mut world = World::new();
     let mut body = ball().position(1.0, 2.0, 3.0);
     body.mass.center = Vec3::new(0.3, 0.0, 0.0);
-    let hung = world.add(body);
-    world.join(Joint::to_world(hung, Vec3::new(0.3, 0.0, 0.0), Vec3::new(1.3, 2.0, 3.0)));
+    let hung = world.insert(body);
+    world.insert_joint(Joint::to_world(hung, Vec3::new(0.3, 0.0, 0.0), Vec3::new(1.3, 2.0, 3.0)));
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 60, DT);
     let body = &simulation.world.bodies[hung];
@@ -106,7 +106,7 @@ fn a_body_tumbles_about_its_principal_axes_wherever_they_lie_in_it() {
         let mut brick = Body::dynamic().shape(Shape::cuboid(0.5, 0.3, 0.2)).position(x, 0.0, 0.0);
         brick.mass.principal_frame = frame;
         // Turned back, so that the axes lie alike in the world.
-        world.add(brick.rotation(frame.inverse()).velocity(Vec3::ZERO, spin));
+        world.insert(brick.rotation(frame.inverse()).velocity(Vec3::ZERO, spin));
     }
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 60, DT);
@@ -119,7 +119,7 @@ fn a_body_tumbles_about_its_principal_axes_wherever_they_lie_in_it() {
 #[test]
 fn a_force_accelerates_by_its_share_of_the_mass() {
     let mut world = empty();
-    let pushed = world.add(ball().total_mass(4.0));
+    let pushed = world.insert(ball().total_mass(4.0));
     world.bodies[pushed].force = Vec3::new(2.0, -8.0, 0.0);
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 60, DT);

@@ -20,9 +20,9 @@ fn a_round_body_that_spins_in_place_stays_at_its_height() {
         [("ball", Shape::ball(0.3)), ("capsule", Shape::capsule(0.5, 0.3)), ("cylinder", Shape::cylinder(0.5, 0.3))]
     {
         let mut world = World::new();
-        world.add(floor().friction(0.0));
+        world.insert(floor().friction(0.0));
         let body = Body::dynamic().shape(shape).friction(0.0).position(0.0, 0.3, 0.0);
-        world.add(body.rotation(lying).velocity(Vec3::ZERO, Vec3::Z * 10.0));
+        world.insert(body.rotation(lying).velocity(Vec3::ZERO, Vec3::Z * 10.0));
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         let mut farthest = 0.0_f32;
         for _ in 0..120 {
@@ -40,9 +40,9 @@ fn a_round_body_that_spins_in_place_stays_at_its_height() {
 fn a_cylinder_that_stands_is_flat_and_one_that_lies_is_round() {
     for (turn, radius) in [(Quat::IDENTITY, 0.0), (Quat::from_rotation_x(FRAC_PI_2), 0.3)] {
         let mut world = World::new();
-        world.add(floor());
+        world.insert(floor());
         let height = if radius == 0.0 { 0.5 } else { 0.3 };
-        world.add(Body::dynamic().shape(Shape::cylinder(0.5, 0.3)).rotation(turn).position(0.0, height, 0.0));
+        world.insert(Body::dynamic().shape(Shape::cylinder(0.5, 0.3)).rotation(turn).position(0.0, height, 0.0));
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         run(&mut simulation, 1, DT);
         let row = *simulation.problem().swept_contacts().next().expect("it touches");
@@ -79,7 +79,7 @@ fn what_a_manifold_is_given_back_is_the_impulse_that_held_its_body() {
         let manifold = simulation.manifolds().next().expect("it lies");
         let pushed = manifold.points().iter().map(|p| manifold.normal * p.normal_impulse + p.friction_impulse);
         let total = pushed.sum::<Vec3>() + manifold.friction_impulse;
-        let total = if manifold.body_a == 1 { -total } else { total };
+        let total = if manifold.a.body.index() == 1 { -total } else { total };
         assert!(total.distance(up) < 0.01 * up.length(), "{friction_at:?}: {total} N s, not {up}");
     }
     // A spin that friction stops: its impulse about the vertical, -mu N d at the most.
@@ -102,7 +102,7 @@ fn a_contact_keeps_its_color_while_it_lasts() {
     let (mut kept, mut anew, mut begun) = (0, 0, 0);
     for step in 0..90 {
         anew += run(&mut simulation, 1, DT).computed;
-        let colors = simulation.manifolds().map(|m| ((m.body_a, m.body_b), m.color));
+        let colors = simulation.manifolds().map(|m| ((m.a.body, m.b.body), m.color));
         let now: HashMap<_, _> = colors.collect();
         for (pair, color) in &now {
             match known.get(pair) {
@@ -122,7 +122,7 @@ fn a_row_has_the_radius_of_each_of_its_surfaces() {
     for radii in [[1.0, 0.2], [0.2, 1.0]] {
         let mut world = empty();
         for (radius, y) in radii.into_iter().zip([0.0, 1.2]) {
-            world.add(Body::dynamic().shape(Shape::ball(radius)).position(0.0, y, 0.0));
+            world.insert(Body::dynamic().shape(Shape::ball(radius)).position(0.0, y, 0.0));
         }
         let mut simulation = simulation(world, SolverConfig::default().without_sleep());
         let problem = simulation.next_problem(DT).expect("a step").0;

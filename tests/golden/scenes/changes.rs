@@ -50,10 +50,10 @@ fn worlds() -> World {
 /// A few boxes on a floor.
 fn table() -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for k in 0..9_u8 {
         let [i, j] = [k % 3, k / 3].map(f32::from);
-        world.add(Body::dynamic().shape(Shape::cuboid(0.4, 0.3, 0.4)).position(i, 0.3 + 0.65 * j, 0.1 * j));
+        world.insert(Body::dynamic().shape(Shape::cuboid(0.4, 0.3, 0.4)).position(i, 0.3 + 0.65 * j, 0.1 * j));
     }
     world
 }
@@ -110,13 +110,13 @@ fn change(simulation: &mut Simulation, step: u32) {
 /// Boxes on a plate that is moved, beside a sensor.
 fn mixer() -> World {
     let mut world = World::new();
-    world.add(Body::kinematic().shape(Shape::cuboid(4.0, 0.2, 4.0)).friction(0.9));
+    world.insert(Body::kinematic().shape(Shape::cuboid(4.0, 0.2, 4.0)).friction(0.9));
     for k in 0..6_u8 {
         let x = 0.9 * f32::from(k) - 2.2;
         let shape = if k % 2 == 0 { Shape::cuboid(0.3, 0.3, 0.3) } else { Shape::cylinder(0.3, 0.3) };
-        world.add(Body::dynamic().shape(shape).position(x, 0.55, 0.2 * x));
+        world.insert(Body::dynamic().shape(shape).position(x, 0.55, 0.2 * x));
     }
-    world.add(Body::fixed().sensor(Shape::cuboid(1.0, 1.0, 1.0)));
+    world.insert(Body::fixed().sensor(Shape::cuboid(1.0, 1.0, 1.0)));
     world
 }
 

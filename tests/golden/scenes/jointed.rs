@@ -21,8 +21,8 @@ pub fn all() -> Vec<Golden> {
 /// A block on each kind of joint, above a floor that the longest ropes reach.
 fn kinds() -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let post = world.add(Body::fixed().shape(Shape::cuboid(20.0, 0.1, 0.1)).position(0.0, 4.0, 0.0));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let post = world.insert(Body::fixed().shape(Shape::cuboid(20.0, 0.1, 0.1)).position(0.0, 4.0, 0.0));
     let slanted = Vec3::new(0.6, 0.0, 0.8);
     let ways: [fn(Joint) -> Joint; 12] = [
         |joint| joint,
@@ -47,11 +47,11 @@ fn kinds() -> World {
         let block = Body::dynamic().shape(Shape::cuboid(0.3, 0.25, 0.4)).density(500.0);
         let block = block.position(x + 0.4, 3.2, 0.1).velocity(slanted, Vec3::new(0.2, 1.0, -0.5));
         let block =
-            world.add(block.rotation(if k == 7 { Quat::from_xyzw(0.0, 0.28, 0.0, 0.96) } else { Quat::IDENTITY }));
-        world.join(way(Joint::new(block, Vec3::new(-0.4, 0.6, -0.1), post, Vec3::new(x, -0.2, 0.0))));
+            world.insert(block.rotation(if k == 7 { Quat::from_xyzw(0.0, 0.28, 0.0, 0.96) } else { Quat::IDENTITY }));
+        world.insert_joint(way(Joint::new(block, Vec3::new(-0.4, 0.6, -0.1), post, Vec3::new(x, -0.2, 0.0))));
         // A ball that hangs on the block, and swings against it.
-        let ball = world.add(Body::dynamic().shape(Shape::ball(0.2)).position(x + 0.4, 2.2, 0.1));
-        world.join(Joint::new(ball, Vec3::new(0.0, 0.5, 0.0), block, Vec3::new(0.0, -0.5, 0.0)));
+        let ball = world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(x + 0.4, 2.2, 0.1));
+        world.insert_joint(Joint::new(ball, Vec3::new(0.0, 0.5, 0.0), block, Vec3::new(0.0, -0.5, 0.0)));
     }
     world
 }

@@ -55,13 +55,13 @@ fn bodies() -> Vec<Body> {
 /// Each shape falls on the floor twice: upright at rest, and turned with a velocity and a spin.
 fn shapes_on(floor: Body) -> World {
     let mut world = World::new();
-    world.add(floor);
+    world.insert(floor);
     for (k, body) in bodies().into_iter().enumerate() {
         let x = 2.0 * k as f32 - 6.0;
         let body = body.friction(0.3 + 0.1 * k as f32).restitution(0.1 * (k % 4) as f32);
-        world.add(body.clone().position(x, 0.9, -1.0));
+        world.insert(body.clone().position(x, 0.9, -1.0));
         let (v, w) = (Vec3::new(0.7, -1.0, 0.3), Vec3::new(1.0, 2.0, -3.0));
-        world.add(body.position(x, 1.3, 1.0).rotation(TURNS[1 + k % 3]).velocity(v, w));
+        world.insert(body.position(x, 1.3, 1.0).rotation(TURNS[1 + k % 3]).velocity(v, w));
     }
     world
 }
@@ -69,17 +69,17 @@ fn shapes_on(floor: Body) -> World {
 /// All shapes on each other between four walls.
 fn heap() -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     for out in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z] {
         let at = -1.3 * out;
-        world.add(Body::fixed().shape(Shape::half_space(out)).position(at.x, at.y, at.z));
+        world.insert(Body::fixed().shape(Shape::half_space(out)).position(at.x, at.y, at.z));
     }
     for layer in 0..4_u8 {
         for (k, body) in bodies().into_iter().enumerate() {
             let [i, j] = [k % 3, k / 3].map(|i| 0.85 * (i as f32 - 1.0));
             let turn = TURNS[(k + usize::from(layer)) % 4];
             let shift = 0.05 * f32::from(layer);
-            world.add(body.position(i + shift, 0.7 + 0.9 * f32::from(layer), j - shift).rotation(turn));
+            world.insert(body.position(i + shift, 0.7 + 0.9 * f32::from(layer), j - shift).rotation(turn));
         }
     }
     world

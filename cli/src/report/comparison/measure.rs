@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn the_speed_is_the_lesser_of_the_reported_one_and_that_of_the_motion() {
         let mut world = World::new();
-        world.add(Body::dynamic().shape(Shape::ball(0.5)));
+        world.insert(Body::dynamic().shape(Shape::ball(0.5)));
         let scene = Scene::new("flight", world.clone(), 40);
         let origin = Origin { build: String::new(), commit: String::new(), machine: String::new(), threads: 1 };
         let mut all =

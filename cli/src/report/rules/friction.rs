@@ -16,9 +16,9 @@ fn friction_settings(rule: &str) -> String {
 /// A block of 1 x 0.4 x 1 m on a floor, with edges along the axes.
 fn block_on_floor(velocity: Vec3, spin: f32, mu: f32) -> World {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(mu));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(mu));
     let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.5)).friction(mu).position(0.0, 0.2, 0.0);
-    world.add(block.velocity(velocity, Vec3::new(0.0, spin, 0.0)));
+    world.insert(block.velocity(velocity, Vec3::new(0.0, spin, 0.0)));
     world
 }
 

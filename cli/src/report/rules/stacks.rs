@@ -90,8 +90,8 @@ pub(super) fn stabilization(report: &mut RulesReport, after_run: &mut dyn FnMut(
 /// Largest upward speed of a box that starts 5 cm deep in the floor (m/s).
 fn exit_speed(text: &str) -> Result<f64> {
     let mut world = World::new();
-    world.add(Body::fixed().shape(Shape::half_space(Vec3::Y)));
-    let cube = world.add(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.45, 0.0));
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    let cube = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.45, 0.0));
     let mut simulation = simulate(world, text)?;
     let mut fastest = 0.0_f64;
     for _ in 0..60 {

@@ -66,9 +66,9 @@ pub(super) fn pushed(draw: &mut Draw, g: f64) -> (Scene, Law) {
     let (sin, cos) = libm::sincos(draw.turn());
     let to = DVec3::new(cos, 0.0, sin);
     let mut world = World::new();
-    world.add(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)).friction(mu as f32));
+    world.insert(Body::fixed().named("ground").shape(Shape::half_space(Vec3::Y)).friction(mu as f32));
     let body = body.friction(mu as f32).position(0.0, half_height as f32, 0.0);
-    let block = world.add(body.rotation(about(Vec3::Y, draw.turn() as f32)));
+    let block = world.insert(body.rotation(about(Vec3::Y, draw.turn() as f32)));
     let mass = f64::from(world.bodies[block].mass.mass);
     world.bodies[block].force = (share * mu * mass * g * to).as_vec3();
     let law = if slides { Law::Slides((share - 1.0) * mu * g * to) } else { Law::Sticks };

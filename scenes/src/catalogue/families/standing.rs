@@ -68,7 +68,7 @@ pub(super) fn stack(draw: &mut Draw) -> Scene {
         let middle = top + (1.0 + 2.0 * gap) * y;
         let block = Body::dynamic().shape(Shape::cuboid(x as f32, y as f32, z as f32)).density(density as f32);
         let block = block.friction(friction as f32).rotation(about(Vec3::Y, turn as f32));
-        world.add(block.position(place[0] as f32, middle as f32, place[1] as f32));
+        world.insert(block.position(place[0] as f32, middle as f32, place[1] as f32));
         top = middle + y;
     }
     Scene::new("stacks", world, 0)
@@ -103,7 +103,11 @@ pub(super) fn leaned(draw: &mut Draw) -> Scene {
     let block = block.friction(friction as f32).rotation(about(Vec3::Y, turn as f32));
     for k in 0..n {
         let out = SHARE * width / n as f64 * k as f64;
-        world.add(block.clone().position((out * cos) as f32, ((k as f64 + 0.5) * height) as f32, (-out * sin) as f32));
+        world.insert(block.clone().position(
+            (out * cos) as f32,
+            ((k as f64 + 0.5) * height) as f32,
+            (-out * sin) as f32,
+        ));
     }
     Scene::new("leaned-towers", world, 0)
 }
