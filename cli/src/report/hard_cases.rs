@@ -42,8 +42,8 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
             columns.push(Some(checks));
         }
         let asked = columns.iter().flatten().next().map_or(&[][..], |checks| checks);
-        let shown: Vec<_> = (0..asked.len()).filter(|&i| !is_zero(&columns, i)).collect();
-        let note = if shown.is_empty() { " (every quantity is 0)" } else { "" };
+        let shown: Vec<_> = (0..asked.len()).filter(|&i| !is_far_below(&columns, i)).collect();
+        let note = if shown.is_empty() { " (all left out)" } else { "" };
         writeln!(rows, "| **{}** | {}{note} ||||||||", case.name, case.summary).expect("text takes all");
         for i in shown {
             let check = &asked[i];
@@ -66,12 +66,8 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     let heads: Vec<_> =
         COLUMNS.iter().map(|&(preset, numbers)| format!("{preset} ({}), {numbers}", substeps(preset))).collect();
     Ok(format!(
-        "# Hard cases\n\n\
-         `drystone hard --page docs` makes this page, `drystone hard --case H3 --preset accurate` runs one case, and\n\
-         `drystone hard --list` describes all. Columns are presets (substeps) on `cpu` (lanes, single precision), `f64`\n\
-         (reference) or `gpu` (shaders). Failures are bold. Quantities that pass with 0 everywhere are left out. The adapter is\n\
-         {gpu}.\n\n\
-         | case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{}",
+        "{}| case | quantity | limit | {} |\n|---|---|---|{}\n| | **cases that pass** | | {} |\n{rows}{}",
+        include_str!("hard_cases_head.md").replace("ADAPTER", &gpu),
         heads.join(" | "),
         "---|".repeat(COLUMNS.len()),
         totals.join(" | "),
@@ -79,9 +75,12 @@ pub fn page(cases: &[&Case], mut progress: impl FnMut(&str)) -> Result<String> {
     ))
 }
 
-/// Whether a quantity passes with 0 in every column that has the case.
-fn is_zero(columns: &[Option<Vec<Check>>], quantity: usize) -> bool {
-    columns.iter().flatten().map(|checks| &checks[quantity]).all(|check| check.passed && check.value == 0.0)
+/// Whether a quantity passes with at most a thousandth of its limit, of either sign, in every column that has the case.
+fn is_far_below(columns: &[Option<Vec<Check>>], quantity: usize) -> bool {
+    columns.iter().flatten().map(|checks| &checks[quantity]).all(|check| {
+        let (Limit::AtMost(limit) | Limit::AtLeast(limit)) = check.limit;
+        check.passed && check.value.abs() <= 1e-3 * limit
+    })
 }
 
 /// A number with three or four significant digits, or a whole number.
@@ -100,10 +99,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_a_quantity_that_passes_with_0_in_every_column_is_left_out() {
-        let check = |value, passed| Check { what: "a check".into(), value, limit: Limit::AtMost(1.0), passed };
-        let (zero, small, failed) = (check(0.0, true), check(1e-9, true), check(0.0, false));
-        let columns = [Some(vec![zero.clone(), zero.clone(), zero.clone()]), None, Some(vec![zero, small, failed])];
-        assert_eq!([0, 1, 2].map(|quantity| is_zero(&columns, quantity)), [true, false, false]);
+    fn only_a_quantity_that_passes_far_below_its_limit_in_every_column_is_left_out() {
+        let check = |value, limit: Limit| Check { what: "a check".into(), value, limit, passed: limit.holds(value) };
+        let failed = Check { passed: false, ..check(0.0, Limit::AtMost(1.0)) };
+        let cases = [
+            (check(0.0, Limit::AtMost(1.0)), true),
+            // Counts of failures have the limit 0.
+            (check(0.0, Limit::AtMost(0.0)), true),
+            (check(9e-4, Limit::AtMost(1.0)), true),
+            (check(-9e-4, Limit::AtMost(1.0)), true),
+            (check(2e-3, Limit::AtMost(1.0)), false),
+            (check(-2e-3, Limit::AtMost(1.0)), false),
+            (check(9e-4, Limit::AtMost(0.5)), false),
+            (check(31.0, Limit::AtLeast(1.0)), false),
+            (check(0.0, Limit::AtLeast(1.0)), false),
+            (check(f64::NAN, Limit::AtMost(1.0)), false),
+            (failed, false),
+        ];
+        for (other, left_out) in cases {
+            let zero = check(0.0, Limit::AtMost(1.0));
+            let columns = [Some(vec![zero.clone(), zero.clone()]), None, Some(vec![zero, other.clone()])];
+            assert_eq!([0, 1].map(|quantity| is_far_below(&columns, quantity)), [true, left_out], "{other:?}");
+        }
     }
 }

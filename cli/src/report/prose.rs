@@ -3,13 +3,13 @@
 /// Longest line of prose (characters).
 pub const WIDTH: usize = 120;
 
-/// A text wrapped at [`WIDTH`], with `indent` before each line except the first.
-pub fn wrapped(text: &str, indent: &str) -> String {
+/// A text wrapped at [`WIDTH`].
+pub fn wrapped(text: &str) -> String {
     let mut words = text.split(' ');
     let (mut lines, mut line) = (String::new(), words.next().unwrap_or_default().to_owned());
     for word in words {
         if line.chars().count() + 1 + word.chars().count() > WIDTH {
-            lines += &(std::mem::replace(&mut line, indent.to_owned() + word) + "\n");
+            lines += &(std::mem::replace(&mut line, word.to_owned()) + "\n");
         } else {
             line += " ";
             line += word;
@@ -18,14 +18,8 @@ pub fn wrapped(text: &str, indent: &str) -> String {
     lines + &line + "\n"
 }
 
-/// Wraps paragraphs and list items. Rows of tables stay whole.
+/// Wraps paragraphs. Rows of tables stay whole.
 pub fn wrapped_page(text: &str) -> String {
-    let line = |line: &str| {
-        if line.starts_with('|') {
-            format!("{line}\n")
-        } else {
-            wrapped(line, if line.starts_with("* ") { "  " } else { "" })
-        }
-    };
+    let line = |line: &str| if line.starts_with('|') { format!("{line}\n") } else { wrapped(line) };
     text.lines().map(line).collect()
 }

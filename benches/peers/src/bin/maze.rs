@@ -1,7 +1,8 @@
-//! `maze [FOLDER]`: the boards of the maze game with drystone, Rapier and Bullet, as a page with pictures in FOLDER (docs).
+//! `maze [FOLDER]`: the boards of the maze game with drystone, Rapier and Bullet, as a page with pictures in FOLDER
+//! (docs).
 //!
-//! Three times: by one script for all, which the pilot wrote on drystone; by another, which it wrote on Rapier; and by the pilot
-//! itself, which looks where the ball is.
+//! Three times: by the pilot, which looks where the ball is; by one script for all, which the pilot wrote on drystone;
+//! and by another, which it wrote on Rapier.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -97,7 +98,7 @@ fn drystone_gpu(map: Map) -> Result<Game> {
     Game::new(map, SolverConfig::default().without_sleep(), choose(BackendChoice::Gpu, 1, false)?.0)
 }
 
-/// How often a game is played for its time, all players in turn; the GPU, which is slow here, plays once.
+/// How often the pilot's game is played for its time, all players in turn; the GPU, which is slow here, plays once.
 const ROUNDS: usize = 9;
 const GPU: usize = 3;
 
@@ -123,15 +124,11 @@ fn page(folder: &Path) -> Result<()> {
         // A script that the pilot wrote is what it did with the engine.
         let players = players();
         let own: Vec<_> = players.iter().map(|player| pilot((player.begin)(map.clone())?)).collect();
-        let of = |writer: usize| -> Vec<_> {
-            let script = || own[writer].as_ref().cloned().map_err(|e| Error::input(e.to_string()));
-            players.iter().map(|_| script()).collect()
-        };
+        let by = |writer: usize| by_script(&players, &map, own[writer].as_ref().ok());
+        let (by_drystone, by_rapier) = (by(DRYSTONE)?, by(RAPIER)?);
         let _ = write!(text, "\n## {board}\n");
-        let by_script = table(&mut text, "script written on drystone", &map, &of(DRYSTONE))?;
-        table(&mut text, "script written on rapier, 3 cm", &map, &of(RAPIER))?;
-        table(&mut text, "the pilot steers", &map, &own)?;
-        let tracks = by_script.iter().zip(players).filter_map(|(played, player)| Some((played.as_ref()?, player)));
+        table(&mut text, &map, &own, &by_drystone, &by_rapier)?;
+        let tracks = by_drystone.iter().zip(players).filter_map(|(played, player)| Some((played.as_ref()?, player)));
         let path = pictures.join(format!("{board}.svg"));
         files::write(&path, picture(&map, tracks).as_bytes())?;
         let _ = write!(text, "\n![tracks on the {board} board](maze/{board}.svg)\n");
@@ -142,8 +139,20 @@ fn page(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Adds a table of what all players make of their scripts, or why there is none; returns the games.
-fn table(text: &mut String, title: &str, map: &Map, scripts: &[Result<Script>]) -> Result<Vec<Option<Played>>> {
+/// What all players make of one script, if there is one.
+fn by_script(players: &[&Player], map: &Map, script: Option<&Script>) -> Result<Vec<Option<Played>>> {
+    let game = |player: &&Player| script.map(|script| play((player.begin)(map.clone())?, script, |_| ())).transpose();
+    players.iter().map(game).collect()
+}
+
+/// Adds a table of all players: the game with the pilot, or why it does not win, and the games by the two scripts.
+fn table(
+    text: &mut String,
+    map: &Map,
+    scripts: &[Result<Script>],
+    by_drystone: &[Option<Played>],
+    by_rapier: &[Option<Played>],
+) -> Result<()> {
     let player = |(k, (player, script))| (k, player, script, Vec::new(), None);
     let mut games: Vec<_> = players().into_iter().zip(scripts).enumerate().map(player).collect();
     let mut first = f64::NAN;
@@ -158,30 +167,48 @@ fn table(text: &mut String, title: &str, map: &Map, scripts: &[Result<Script>]) 
         *game = Some(played);
         Ok(())
     })?;
-    let _ = write!(
-        text,
-        "\n| {title} | ended | time s | slip rms mm/s | slip max mm/s | rolling | deepest mm | time a step |\n\
-         |---|---|---|---|---|---|---|---|\n"
+    text.push_str(
+        "\n| engine | pilot: end, s | slip rms mm/s | slip max mm/s | rolling | deepest mm | time a step \
+         | drystone's script: end, s | Rapier's script: end, s |\n|---|---|--:|--:|--:|--:|--:|---|---|\n",
     );
-    for (_, Player { name, .. }, script, ratios, game) in &games {
-        let _ = match (game, script) {
-            (Some(played), _) => writeln!(text, "| {name} | {} | {:.2} |", row(played), median(ratios)),
-            (None, Err(e)) => writeln!(text, "| {name} | {e} | | | | | | |"),
-            (None, Ok(_)) => writeln!(text, "| {name} | not played | | | | | | |"),
+    for (k, Player { name, .. }, script, ratios, game) in &games {
+        let piloted = match (game, script) {
+            (Some(played), _) => format!("{} | {} | {:.2}", end(played), errors(played), median(ratios)),
+            (None, Err(e)) => without_game(&short(e, map)),
+            (None, Ok(_)) => without_game("not played"),
         };
+        let [drystone, rapier] = [by_drystone, by_rapier].map(|games| games[*k].as_ref().map_or("-".into(), end));
+        let _ = writeln!(text, "| {name} | {piloted} | {drystone} | {rapier} |");
     }
-    Ok(games.into_iter().map(|(.., game)| game).collect())
+    Ok(())
 }
 
-fn row(played: &Played) -> String {
+/// The cells of the pilot's game if there is none: why, and nothing in the columns of figures.
+fn without_game(why: &str) -> String {
+    why.to_owned() + &" | ".repeat(5)
+}
+
+/// Why the pilot did not win, without the board and the ball, which are the same in the whole table.
+fn short(e: &Error, map: &Map) -> String {
+    let message = e.to_string();
+    message.strip_prefix(&format!("{}: the ball ", map.name)).unwrap_or(&message).to_owned()
+}
+
+/// `goal 11.80`.
+fn end(played: &Played) -> String {
     let ended = match played.outcome {
         Outcome::Goal => "goal",
         Outcome::Hole => "hole",
         Outcome::Time => "on the way",
     };
+    format!("{ended} {:.2}", played.time)
+}
+
+/// Slip, share of rolling steps and deepest overlap.
+fn errors(played: &Played) -> String {
     let rolling = 100.0 * f64::from(played.slip.steps) / f64::from(played.steps.max(1));
     let (rms, max, deepest) = (played.slip.rms * 1e3, played.slip.max * 1e3, played.penetration * 1e3);
-    format!("{ended} | {:.2} | {rms:.3} | {max:.2} | {rolling:.0} % | {deepest:.4}", played.time)
+    format!("{rms:.3} | {max:.2} | {rolling:.0} % | {deepest:.4}")
 }
 
 /// Pixels of a side of a cell, of the space around the board, and of a line of the legend.

@@ -9,7 +9,7 @@ use crate::report::plot::Scale::Decades;
 use crate::report::plot::{Frame, Look, Series, svg};
 
 /// Errors for which tables have times.
-pub(super) const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
+const SOLVED: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
     if solves.is_empty() {
@@ -48,7 +48,7 @@ pub(super) fn problems(html: &mut String, solves: &[Vec<SolveRow>]) {
 }
 
 /// The solvers in the order of the rows.
-pub(super) fn solvers(solves: &[Vec<SolveRow>]) -> Vec<String> {
+fn solvers(solves: &[Vec<SolveRow>]) -> Vec<String> {
     let mut solvers: Vec<String> = Vec::new();
     for solver in solves.iter().flatten().map(SolveRow::solver) {
         if !solvers.contains(&solver) {
@@ -78,7 +78,7 @@ fn grid_table<const N: usize>(
 }
 
 /// Least time to reach an error with a solver (ms).
-pub(super) fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
+fn time_to(rows: &[SolveRow], solver: &str, level: f64) -> Option<f64> {
     let fit = rows.iter().filter(|row| row.solver() == solver && row.e_vel <= level);
     fit.map(|row| row.ms_low).min_by(f64::total_cmp)
 }

@@ -9,9 +9,7 @@ use std::path::{Path, PathBuf};
 use super::duels::{OWN, ahead};
 use super::page::{faults, of_side};
 use super::pareto::{Duel, FLOOR, Fault, front};
-use super::problems::{SOLVED, solvers, time_to};
 use super::row::{Row, WindowRow};
-use super::solves::SolveRow;
 use super::survey::Report;
 use crate::files;
 use crate::report::number::number;
@@ -95,15 +93,14 @@ fn first_difference<'a>(old: &'a str, new: &'a str) -> Option<(usize, &'a str, &
 /// All rows that the tables use.
 struct Rows {
     results: Vec<Vec<Row>>,
-    solves: Vec<Vec<SolveRow>>,
     thirds: Vec<WindowRow>,
 }
 
 impl Rows {
     fn read(docs: &Path) -> Result<Self> {
-        let Report { results, solves } = Report::read(&docs.join("report"))?;
+        let Report { results, .. } = Report::read(&docs.join("report"))?;
         let thirds = files::rows(&docs.join("performance/engines-1.csv"))?;
-        Ok(Self { results, solves, thirds })
+        Ok(Self { results, thirds })
     }
 
     /// A page with all its tables rewritten.
@@ -124,8 +121,7 @@ impl Rows {
             "engines" => self.engines(),
             "equal error" => self.equal_error(),
             "kinds" => self.kinds(),
-            "problems" => Ok(self.problems()),
-            _ => Err(Error::input(format!("unknown rows {name:?}: must be engines, equal error, kinds or problems"))),
+            _ => Err(Error::input(format!("unknown rows {name:?}: must be engines, equal error or kinds"))),
         }
     }
 
@@ -281,24 +277,6 @@ impl Rows {
         }
         Ok(text)
     }
-
-    /// Least times of the solvers to reach errors of contact problems.
-    fn problems(&self) -> String {
-        let solvers = solvers(&self.solves);
-        let levels = SOLVED.into_iter().filter(|&level| level < 0.1);
-        let heads =
-            levels.clone().flat_map(|level| solvers.iter().map(move |solver| format!(" {level:.0e}, {solver} |")));
-        let count = solvers.len() * levels.clone().count();
-        let mut text =
-            format!("| problem | contacts |{}\n|---|--:|{}\n", heads.collect::<String>(), "--:|".repeat(count));
-        for rows in &self.solves {
-            let time = |solver: &String, level| Cell::of(time_to(rows, solver, level).map(|ms| Figure::of(ms, "")));
-            let of = |level| bold(solvers.iter().map(|solver| time(solver, level)).collect());
-            let cells: String = levels.clone().map(of).collect();
-            let _ = writeln!(text, "| {} | {} |{cells}", rows[0].problem, rows[0].contacts);
-        }
-        text
-    }
 }
 
 /// The least error of an engine at any setting.
@@ -337,7 +315,7 @@ impl Figure {
     }
 
     fn text(&self) -> String {
-        format!("{} {}", self.number, self.unit).trim_end().to_owned()
+        format!("{} {}", self.number, self.unit)
     }
 }
 
@@ -401,7 +379,7 @@ mod tests {
     fn a_page_gets_its_tables_and_keeps_the_rest() {
         let own = vec![row(OWN, 1.0, 2e-3), row(OWN, 9.0, 1e-5), row("rapier", 0.5, 1e-3)];
         let named = own.into_iter().map(|row| Row { scene: "wall".into(), bodies: 410, in_place: Some(410), ..row });
-        let rows = Rows { results: vec![named.collect()], solves: Vec::new(), thirds: Vec::new() };
+        let rows = Rows { results: vec![named.collect()], thirds: Vec::new() };
         let page = "before\n<!-- rows: engines -->\nold\n<!-- end of rows -->\nafter\n";
         let text = rows.rewritten(page).expect("a page");
         assert!(text.starts_with("before\n<!-- rows: engines -->\ndrystone and [Rapier]"), "{text}");

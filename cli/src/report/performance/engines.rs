@@ -25,6 +25,16 @@ fn thirds<'a>(rows: &'a [WindowRow], scene: &str, threads: usize, setting: &str)
     rows.iter().filter(|r| (&*r.scene, r.threads, &*r.setting) == (scene, threads, setting)).collect()
 }
 
+/// `1 thread`, `2 threads`.
+pub(super) fn thread_count(threads: usize) -> String {
+    format!("{threads} {}", if threads == 1 { "thread" } else { "threads" })
+}
+
+/// The name of a setting in the table, without what the page says of all: the CPU, and the engines' defaults.
+fn name(setting: &str) -> String {
+    setting.replace(" cpu ", " ").replace(" 30 Hz", "")
+}
+
 fn cell(numbers: impl Iterator<Item = f64>) -> String {
     numbers.map(number).collect::<Vec<_>>().join(", ")
 }
@@ -32,37 +42,33 @@ fn cell(numbers: impl Iterator<Item = f64>) -> String {
 pub(super) fn table(rows: &[WindowRow]) -> String {
     let all_threads = distinct(rows.iter().map(|r| r.threads));
     let mut text = String::from("| scene, steps | engine |");
-    for threads in &all_threads {
-        let plural = if *threads == 1 { "thread" } else { "threads" };
-        let _ = write!(text, " {threads} {plural}: ms in each third | to the best other | worst, first |");
+    for &threads in &all_threads {
+        let _ = write!(text, " {}: ms in each third | to the best other |", thread_count(threads));
     }
     let _ = write!(text, " mean overlap mm | deepest mm | rms mm/s | in place |\n|---|---|");
-    let _ = writeln!(text, "{}--:|--:|--:|--:|", "--:|--:|--:|".repeat(all_threads.len()));
+    let _ = writeln!(text, "{}--:|--:|--:|--:|", "--:|--:|".repeat(all_threads.len()));
     for scene in distinct(rows.iter().map(|r| &*r.scene)) {
         let of_scene = || rows.iter().filter(|r| r.scene == scene);
         let steps = of_scene().map(|r| r.to).max().unwrap_or(0);
         for (k, setting) in distinct(of_scene().map(|r| &*r.setting)).into_iter().enumerate() {
             let head = if k == 0 { format!("{scene}, {steps}") } else { String::new() };
-            let _ = write!(text, "| {head} | {setting} |");
+            let _ = write!(text, "| {head} | {} |", name(setting));
             for &threads in &all_threads {
                 let own = thirds(rows, scene, threads, setting);
                 let is_own = own.first().is_some_and(|r| r.engine == OWN);
                 let to_best = cell(own.iter().filter(|_| is_own).filter_map(|r| r.to_best));
-                let worst = own.iter().map(|r| r.ms_worst / r.ms).reduce(f64::max);
-                let first = own.first().map(|r| r.ms_first / r.ms);
-                let slow = cell(worst.into_iter().chain(first));
                 let ms = cell(own.iter().map(|r| r.ms));
-                let _ = write!(text, " {ms} | {to_best} | {slow} |");
+                let _ = write!(text, " {ms} | {to_best} |");
             }
-            // Errors are those of the first number of threads.
+            // Errors are those of the first number of threads, at the end of the run.
             let own = thirds(rows, scene, all_threads[0], setting);
-            let mean = cell(own.iter().map(|r| 1e3 * r.penetration_mean));
             let Some(end) = own.last() else {
                 let _ = writeln!(text, " | | | |");
                 continue;
             };
             let place = end.in_place.map_or_else(String::new, |n| format!("{n} of {}", end.bodies));
-            let (deepest, speed) = (number(1e3 * end.penetration_max), number(1e3 * end.speed_rms));
+            let [mean, deepest, speed] =
+                [end.penetration_mean, end.penetration_max, end.speed_rms].map(|x| number(1e3 * x));
             let _ = writeln!(text, " {mean} | {deepest} | {speed} | {place} |");
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Rows;
-use super::engines::{OWN, distinct};
+use super::engines::{OWN, distinct, thread_count};
 use crate::report::bench::{FallingRow, GrowthRow, LimitRow, OPERATIONS, StatesRow, WorldsRow};
 use crate::report::comparison::WindowRow;
 use crate::report::number::number;
@@ -11,23 +11,15 @@ use crate::report::prose::wrapped_page;
 
 pub(super) fn findings(rows: &Rows) -> String {
     [
-        (
-            "Other engines",
-            "engines-1.csv, engines-2.csv",
-            format!("{}\n\n{}", beside(&rows.engines), stalls(&rows.engines)),
-        ),
-        ("Stages of a step, falling and at rest", "falling.csv", stages(&rows.falling)),
-        ("One island of any size", "growth.csv", growth(&rows.growth)),
-        ("Sweeps and hardware limits", "limits.csv", limits(&rows.limits)),
-        ("Many worlds", "worlds.csv", worlds(&rows.worlds)),
-        ("Saved states", "states.csv", states(&rows.states)),
+        ("Other engines", format!("{}\n\n{}", beside(&rows.engines), stalls(&rows.engines))),
+        ("Stages of a step, falling and at rest", stages(&rows.falling)),
+        ("One island of any size", growth(&rows.growth)),
+        ("Sweeps and hardware limits", limits(&rows.limits)),
+        ("Many worlds", worlds(&rows.worlds)),
+        ("Saved states", states(&rows.states)),
     ]
-    .map(|(title, files, text)| format!("\n## {title}\n\n{}\nRows: {}.\n", wrapped_page(&text), links(files)))
+    .map(|(title, text)| format!("\n## {title}\n\n{}", wrapped_page(&text)))
     .concat()
-}
-
-fn links(files: &str) -> String {
-    files.split(", ").map(|file| format!("[{file}](performance/{file})")).collect::<Vec<_>>().join(", ")
 }
 
 /// `one thread`, `2 threads`.
@@ -43,13 +35,14 @@ fn range(numbers: impl Iterator<Item = f64> + Clone) -> String {
 
 fn beside(rows: &[WindowRow]) -> String {
     let own = || rows.iter().filter(|r| r.engine == OWN);
+    let ratios = || own().filter_map(|r| Some((r.to_best?, r)));
     let times = distinct(own().map(|r| r.threads)).into_iter().map(|threads| {
-        let ratios = || own().filter(move |r| r.threads == threads).filter_map(|r| Some((r.to_best?, r)));
-        let most = ratios().max_by(|a, b| a.0.total_cmp(&b.0));
-        let of_most =
-            most.map_or_else(String::new, |(_, r)| format!(", most in {}, steps {} to {}", r.scene, r.from, r.to));
-        format!("{} ({}{of_most})", range(ratios().map(|r| r.0)), on(threads))
+        let of_threads = ratios().filter(move |(_, r)| r.threads == threads);
+        format!("{} ({})", range(of_threads.map(|(ratio, _)| ratio)), on(threads))
     });
+    let most = ratios().max_by(|a, b| a.0.total_cmp(&b.0));
+    let of_most =
+        most.map_or_else(String::new, |(_, r)| format!(", most in {}, steps {} to {}", r.scene, r.from, r.to));
     // Relative to the smallest overlap of another engine, for each third.
     let to_least = |mine: &WindowRow| {
         let same = |r: &&WindowRow| r.engine != OWN && (&r.run, r.from) == (&mine.run, mine.from);
@@ -58,25 +51,26 @@ fn beside(rows: &[WindowRow]) -> String {
     };
     let overlap = own().filter_map(to_least).fold(0.0, f64::max);
     format!(
-        "In all thirds, {OWN} needs {} of the fastest other engine's time. Its mean overlap is at most {} of the least \
-         mean overlap of the others.",
+        "In all thirds, {OWN} needs {} of the fastest other engine's time{of_most}. Its mean overlap is at most {} of \
+         the others' least.",
         times.collect::<Vec<_>>().join(" and "),
         number(overlap)
     )
 }
 
 fn stalls(rows: &[WindowRow]) -> String {
-    let own = || rows.iter().filter(|r| r.engine == OWN);
-    let largest = |of: fn(&WindowRow) -> f64| own().map(|r| (of(r), r)).max_by(|a, b| a.0.total_cmp(&b.0));
-    let name = |found: Option<(f64, &WindowRow)>| {
-        found.map_or_else(String::new, |(x, r)| format!("{} ({}, {})", number(x), r.scene, on(r.threads)))
+    let most = |of: fn(&WindowRow) -> f64| {
+        let own = rows.iter().filter(|r| r.engine == OWN).map(|r| (of(r), r)).max_by(|a, b| a.0.total_cmp(&b.0));
+        let others = rows.iter().filter(|r| r.engine != OWN).map(of).fold(0.0, f64::max);
+        own.map_or_else(String::new, |(x, r)| {
+            format!("{} ({}, {}; others {})", number(x), r.scene, on(r.threads), number(others))
+        })
     };
-    let first = |r: &WindowRow| if r.from == 1 { r.ms_first / r.ms } else { 0.0 };
     format!(
-        "The slowest later step takes at most {} times its third's median. The first step takes at most {} times that, \
-         because it computes all pairs and colors and allocates all memory.",
-        name(largest(|r| r.ms_worst / r.ms)),
-        name(largest(first))
+        "Relative to its third's median, the slowest later step takes at most {} and the first step at most {}. The \
+         first step computes all pairs and colors and allocates all memory.",
+        most(|r| r.ms_worst / r.ms),
+        most(|r| if r.from == 1 { r.ms_first / r.ms } else { 0.0 })
     )
 }
 
@@ -86,17 +80,17 @@ fn stages(rows: &[FallingRow]) -> String {
     let Some(most) = rows.iter().map(key).max() else { return String::new() };
     let shown: Vec<_> = rows.iter().filter(|r| key(r) == most).collect();
     let mut text = format!(
-        "Medians of {}, {}, in ms:\n\n\
-         | steps | step | detection | colors | rows | sweeps | store | pairs recomputed | manifolds |\n\
-         |---|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+        "Medians of {}, {}, in ms ([rows](performance/falling.csv)):\n\n\
+         | steps | step | detection | colors | rows | sweeps | pairs recomputed | manifolds |\n\
+         |---|--:|--:|--:|--:|--:|--:|--:|\n",
         shown[0].scene,
         on(shown[0].threads)
     );
     for r in shown {
-        let [ms, detect, color, prepare, run, store] = [r.ms, r.detect, r.color, r.prepare, r.run, r.store].map(number);
+        let [ms, detect, color, prepare, run] = [r.ms, r.detect, r.color, r.prepare, r.run].map(number);
         let _ = writeln!(
             text,
-            "| {} to {} | {ms} | {detect} | {color} | {prepare} | {run} | {store} | {} of {} | {} |",
+            "| {} to {} | {ms} | {detect} | {color} | {prepare} | {run} | {} of {} | {} |",
             r.from, r.to, r.computed, r.pairs, r.manifolds
         );
     }
@@ -104,48 +98,50 @@ fn stages(rows: &[FallingRow]) -> String {
 }
 
 fn growth(rows: &[GrowthRow]) -> String {
-    let mut text = String::from(
-        "A plane pyramid is one island. Sweep time is the least of the stage `run` (in parentheses: relative to the \
-         smallest island). Bytes are the process's peak. Other times are in ms.\n\n\
-         | boxes | sweeps, ns per manifold and pass | bytes a box | threads | step | detection | rows | sweeps |\n\
-         |--:|--:|--:|--:|--:|--:|--:|--:|\n",
+    let all_threads = distinct(rows.iter().map(|r| r.threads));
+    let heads: Vec<_> = all_threads.iter().map(|&threads| thread_count(threads)).collect();
+    let mut text = format!(
+        "A plane pyramid is one island. Times per manifold are the least of the stage `run` (in parentheses: relative \
+         to the smallest island). Bytes are the process's peak. Times in ms are on {} \
+         ([rows](performance/growth.csv)).\n\n\
+         | boxes | ns per manifold and pass, {} | bytes a box | step, ms | detection, ms | rows, ms | sweeps, ms |\n\
+         |--:|{}--:|--:|--:|--:|--:|\n",
+        on(all_threads[0]),
+        heads.join(" | "),
+        "--:|".repeat(heads.len())
     );
     for scene in distinct(rows.iter().map(|r| &r.scene)) {
         let own: Vec<_> = rows.iter().filter(|r| r.scene == *scene).collect();
-        let times = own.iter().map(|r| format!("{} ({}) with {}", number(r.ns), number(r.growth), on(r.threads)));
+        let time = |threads: &usize| {
+            let found = own.iter().find(|r| r.threads == *threads);
+            found.map_or_else(String::new, |r| format!("{} ({})", number(r.ns), number(r.growth)))
+        };
+        let times: Vec<_> = all_threads.iter().map(time).collect();
         let memory = own[0].bytes_a_box.map_or_else(String::new, |bytes| format!("{bytes:.0}"));
         let [ms, detect, rows, run] = [own[0].ms, own[0].detect, own[0].prepare, own[0].run].map(number);
-        let _ = writeln!(
-            text,
-            "| {} | {} | {memory} | {} | {ms} | {detect} | {rows} | {run} |",
-            own[0].boxes,
-            times.collect::<Vec<_>>().join(", "),
-            on(own[0].threads)
-        );
+        let (boxes, times) = (own[0].boxes, times.join(" | "));
+        let _ = writeln!(text, "| {boxes} | {times} | {memory} | {ms} | {detect} | {rows} | {run} |");
     }
     text.trim_end().to_owned()
 }
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
-        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. Bytes \
-         are those of the SIMD lanes (in parentheses: of the kernels over plain rows, which load a body for each \
-         contact). The triad is a = b + s c over the MiB that the lanes hold; cached bodies can exceed 100 % of it. \
-         The peak is for multiplications and additions on registers.\n\n\
-         | scene | MiB | threads | ns a manifold | bytes a manifold | million points a second | of the triad, GB/s | of the peak, G/s |\n\
-         |---|--:|--:|--:|--:|--:|--:|--:|\n",
+        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. MiB and \
+         bytes are those of the SIMD lanes. The triad is a = b + s c over as many MiB. The peak is for multiplications \
+         and additions on registers ([rows](performance/limits.csv)).\n\n\
+         | scene | MiB | threads | ns a manifold | bytes a manifold | of the triad, GB/s | of the peak, G/s |\n\
+         |---|--:|--:|--:|--:|--:|--:|\n",
     );
     for r in rows {
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {:.0} ({:.0}) | {} | {:.0} % of {} | {:.0} % of {} |",
+            "| {} | {} | {} | {} | {:.0} | {:.0} % of {} | {:.0} % of {} |",
             r.scene,
             number(r.held as f64 / f64::from(1 << 20)),
-            on(r.threads),
+            r.threads,
             number(r.ns),
             r.lane_bytes,
-            r.kernel_bytes,
-            number(r.sweeps * 1e-6),
             100.0 * r.of_triad,
             number(r.triad * 1e-9),
             100.0 * r.of_peak,
@@ -156,22 +152,36 @@ fn limits(rows: &[LimitRow]) -> String {
 }
 
 fn worlds(rows: &[WorldsRow]) -> String {
+    let counts = distinct(rows.iter().map(|r| r.worlds));
     let mut text = String::from(
-        "Steps of single worlds at rest per second (in parentheses: relative to the best number of worlds):\n\n",
+        "Steps of single worlds at rest per second, by the number of worlds ([rows](performance/worlds.csv)):\n\n\
+         | scene | threads |",
     );
-    for key in distinct(rows.iter().map(|r| (&r.scene, r.threads))) {
-        let own = rows.iter().filter(|r| (&r.scene, r.threads) == key);
-        let list = own.map(|r| format!("{:.0} ({}) of {}", r.per_second, number(r.of_best), r.worlds));
-        let _ = writeln!(text, "* {}, {}: {} worlds", key.0, on(key.1), list.collect::<Vec<_>>().join(", "));
+    for (k, count) in counts.iter().enumerate() {
+        let unit = match (k, count) {
+            (0, 1) => " world",
+            (0, _) => " worlds",
+            _ => "",
+        };
+        let _ = write!(text, " {count}{unit} |");
+    }
+    let _ = writeln!(text, "\n|---|--:|{}", "--:|".repeat(counts.len()));
+    for (scene, threads) in distinct(rows.iter().map(|r| (&r.scene, r.threads))) {
+        let _ = write!(text, "| {scene} | {threads} |");
+        for &count in &counts {
+            let found = rows.iter().find(|r| (&r.scene, r.threads, r.worlds) == (scene, threads, count));
+            let _ = write!(text, " {} |", found.map_or_else(String::new, |r| format!("{:.0}", r.per_second)));
+        }
+        text.push('\n');
     }
     text.trim_end().to_owned()
 }
 
 fn states(rows: &[StatesRow]) -> String {
     let mut text = String::from(
-        "The pile is awake and at rest. A step is in ms; other times are relative to it. `Rollback::push` copies a \
-         state into allocated memory, `Simulation::restore` returns to it, and `save` and `load` convert it to and \
-         from bytes.\n\n\
+        "The pile is awake and at rest. A step is in ms, other times relative to it ([rows](performance/states.csv)). \
+         `Rollback::push` copies a state into allocated memory, `Simulation::restore` returns to it, and `save` and \
+         `load` convert it to and from bytes.\n\n\
          | scene | threads | step | push | restore | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for r in rows {

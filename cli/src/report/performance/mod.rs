@@ -70,11 +70,12 @@ fn rows<R: DeserializeOwned>(folder: &Path, name: &str) -> Result<Vec<R>> {
 pub fn performance(directory: &Path) -> Result<()> {
     let folder = directory.join("performance");
     let rows = Rows::read(&folder)?;
+    let [one, two] = ENGINES;
     let page = [
         include_str!("../performance_head.md"),
-        &format!("\n{}\n\n", rows.origin()),
+        &format!("\n{}\nRows: [one thread](performance/{one}), [two](performance/{two}).\n\n", rows.origin()),
         &engines::table(&rows.engines),
-        "\n![time of a step over the run, one picture a scene](performance/engines.svg)\n",
+        "\n![time of a step over the run, by scene](performance/engines.svg)\n",
         &findings::findings(&rows),
         include_str!("../performance_tail.md"),
     ];

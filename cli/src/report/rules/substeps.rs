@@ -25,8 +25,9 @@ const MAX_BOXES: u32 = 128;
 pub(super) fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\n## Substeps\n\nThe tallest tower that stands for 20 s, up to {MAX_BOXES} boxes, shifted by 1 cm alternately to both sides. All islands take\n\
-         the same substeps.\n\n\
+        "\n## Substeps\n\n\
+         The table has the tallest tower, up to {MAX_BOXES} boxes shifted by 1 cm to alternate sides, that stands for \
+         20 s. All islands\ntake the same substeps.\n\n\
          | substeps | soft, default | Baumgarte, as many sweeps |\n|---|---|---|"
     );
     for substeps in [1_u32, 4, 8, 16] {
@@ -46,8 +47,10 @@ pub(super) fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> 
 pub(super) fn ratios(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThe heaviest top (1, 2, 5, 10, ... 10,000 times the other boxes) with which a tower of 10 stands for 20 s, and the\n\
-         overlap of two towers:\n\n| substeps | heaviest top | overlap, 1 under 1000 | overlap, tower of 10 with 1000 times on top |\n|---|---|---|---|"
+        "\nThis table has the heaviest top (1, 2, 5, ... 10,000 times the other boxes) on a tower of 10 that stands \
+         for 20 s, and\nthe overlap of two towers:\n\n\
+         | substeps | heaviest top | overlap, 1 under 1000 | overlap, tower of 10 with 1000 times on top |\n\
+         |---|---|---|---|"
     );
     let tried = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
     for substeps in [4_u32, 16, 32, 64] {
