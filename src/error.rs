@@ -66,6 +66,11 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
+    /// Whether a device was lost.
+    pub(crate) fn is_lost(&self) -> bool {
+        matches!(self, Self::Lost(_))
+    }
+
     /// Exit code of the command line: 1 for a defect of the program, 2 for the caller's input, 3 for the machine.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -362,7 +362,7 @@ impl Simulation {
             let (step, carry) = assembled(&mut self.stages);
             let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
             let Err(error) = ran else { break };
-            let successor = if is_lost(&error) { self.backend.successor() } else { None };
+            let successor = if error.is_lost() { self.backend.successor() } else { None };
             self.repeat_step(error, successor, dt, stats)?;
         }
         self.store_step(dt, stats);
@@ -377,7 +377,7 @@ impl Simulation {
             let ran = self.backend.step_async(step, carry).await;
             stats.times.run += start.elapsed();
             let Err(error) = ran else { break };
-            let successor = if is_lost(&error) { self.backend.successor_async().await } else { None };
+            let successor = if error.is_lost() { self.backend.successor_async().await } else { None };
             self.repeat_step(error, successor, dt, stats)?;
         }
         self.store_step(dt, stats);
@@ -653,8 +653,4 @@ impl Simulation {
 /// The assembled step, for a backend.
 fn assembled(stages: &mut Stages) -> (CheckedStep<'_>, &Carry) {
     (CheckedStep::built(&mut stages.problem, &stages.plan.passes), &stages.contacts.carry)
-}
-
-fn is_lost(error: &Error) -> bool {
-    matches!(error, Error::Lost(_))
 }

@@ -6,10 +6,11 @@ import os
 import sys
 import tempfile
 import threading
+import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,6 +66,7 @@ MAX_PIXELS = 8192
 # More threads than any machine has processors would only exhaust the system.
 MAX_THREADS = 1024
 LISTEN = ("contacts", "impulses", "hits")
+BACKENDS = ("cpu", "gpu")
 EVENT = np.dtype([("world", "u4"), ("kind", "U8"), ("a", "i8"), ("b", "i8"), ("value", "f4")])
 
 
@@ -261,6 +263,10 @@ class Batch:
     order of calls to others, threads or the machine. A call does not change worlds that it does not name. After a fork
     a batch raises RuntimeError, because its threads are gone.
 
+    `backend` "gpu" runs the steps of all worlds on the best adapter, worlds with equal settings and rules as one
+    problem. With `exact`, they have the bits of the CPU. If the device is lost, or has too little memory, the batch
+    repeats the step on the CPU, continues on another backend, and warns; `fault` has the reason.
+
     `position` [W, B, 3], `rotation` [W, B, 4] (x y z w), `linear_velocity` and `angular_velocity` [W, B, 3] are
     read-only views of arrays that each call updates. Copy an array to keep its values. Rows of bodies that a world does
     not have are NaN.
@@ -268,7 +274,7 @@ class Batch:
     `force` and `torque` [W, B, 3], `ctrl` [W, U] and `gravity` [W, 3] are inputs: write to them. Each call that steps
     reads them at its start, and they last until they change. A reset sets them to the values of the scene.
 
-    ValueError: an argument is invalid.
+    ValueError: an argument is invalid. AdapterError: there is no GPU, or it cannot run the exact mode.
 
     >>> import drystone as ds
     >>> batch = ds.Batch(ds.Scene.find("tower", n=3), 4, config=ds.Config("fast"), num_threads=1)
@@ -288,6 +294,8 @@ class Batch:
         *,
         config: Config | Sequence[Config] | None = None,
         num_threads: int = 0,
+        backend: Literal["cpu", "gpu"] = "cpu",
+        exact: bool = False,
         listen: Collection[str] = (),
         hits_above: float = 0.5,
     ) -> None:
@@ -301,16 +309,16 @@ class Batch:
             raise ValueError(f"{given}: must be one, or one for each world")
         count = counts.pop() if counts else 1
         is_one = len(scenes) == len(configs) == 1
-        threads = _threads(num_threads)
+        threads, gpu = _threads(num_threads), _gpu(backend, exact)
         of_scenes, of_configs = ([one._scene for one in scenes], [one._config for one in configs])
         if not is_one:
             of_scenes = of_scenes * (count if len(of_scenes) == 1 else 1)
             of_configs = of_configs * (count if len(of_configs) == 1 else 1)
-        batch = _drystone.Batch.of_scenes(of_scenes, of_configs, count, threads)
+        batch = _drystone.Batch.of_scenes(of_scenes, of_configs, count, threads, gpu)
         words = _listen(batch, listen, hits_above)
         if words:
             # The start states must listen too, because a reset restores them.
-            batch = _drystone.Batch.of_states(batch.states(np.arange(count)), threads)
+            batch = _drystone.Batch.of_states(batch.states(np.arange(count)), threads, gpu)
         self._begin(batch, "impulses" in words, scenes * (count if len(scenes) == 1 else 1))
 
     @classmethod
@@ -319,6 +327,8 @@ class Batch:
         states: Sequence[bytes] | Snapshots,
         *,
         num_threads: int = 0,
+        backend: Literal["cpu", "gpu"] = "cpu",
+        exact: bool = False,
         listen: Collection[str] | None = None,
         hits_above: float = 0.5,
     ) -> Self:
@@ -338,12 +348,12 @@ class Batch:
         """
         own = cls.__new__(cls)
         snapshots = states if isinstance(states, Snapshots) else Snapshots.from_bytes(states)
-        threads = _threads(num_threads)
-        batch = _drystone.Batch.of_states(snapshots._states, threads)
+        threads, gpu = _threads(num_threads), _gpu(backend, exact)
+        batch = _drystone.Batch.of_states(snapshots._states, threads, gpu)
         words = ["impulses"]
         if listen is not None:
             words = _listen(batch, listen, hits_above)
-            batch = _drystone.Batch.of_states(batch.states(np.arange(len(snapshots))), threads)
+            batch = _drystone.Batch.of_states(batch.states(np.arange(len(snapshots))), threads, gpu)
         own._begin(batch, "impulses" in words, [])
         return own
 
@@ -409,6 +419,16 @@ class Batch:
     def num_threads(self) -> int:
         """Number of threads that step worlds."""
         return self._batch.threads
+
+    @property
+    def backend(self) -> str:
+        """The backend that steps worlds: "cpu" or "gpu"."""
+        return self._batch.backend
+
+    @property
+    def fault(self) -> str | None:
+        """One line if the GPU failed in the last call that stepped: the reason, and the backend that continues."""
+        return self._batch.fault
 
     @property
     def position(self) -> Floats:
@@ -724,6 +744,8 @@ class Batch:
         failed: list[tuple[int, str]] | None = None
         try:
             failed = self._batch.run(n, every, chosen, dt, self._inputs, self._outputs, ctrl, list(records.items()))
+            if self._batch.fault is not None:
+                warnings.warn(self._batch.fault, RuntimeWarning, stacklevel=4)
         finally:
             # Read the state of worlds that did not complete the call.
             late = chosen if failed is None else np.array([world for world, _ in failed], np.int64)
@@ -1132,6 +1154,16 @@ def _threads(count: Any) -> int:
     if threads > MAX_THREADS:
         raise ValueError(f"num_threads = {threads}: must be at most {MAX_THREADS}")
     return threads
+
+
+def _gpu(backend: Any, exact: Any) -> bool | None:
+    """Whether a GPU runs in exact mode; None without a GPU."""
+    if not (isinstance(backend, str) and backend in BACKENDS):
+        raise ValueError(f"backend = {backend!r}: must be one of {', '.join(map(repr, BACKENDS))}")
+    if not isinstance(exact, bool):
+        raise ValueError(f"exact = {exact!r}: must be True or False")
+    # The CPU is exact.
+    return exact if backend == "gpu" else None
 
 
 def _side(name: str, pixels: Any) -> int:

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use drystone::backend::{BackendChoice, choose};
 use drystone::batch::{Column, Contacts, Member, Run, write};
 use drystone::glam::Vec3;
 use drystone::queries::Filter;
@@ -100,10 +101,11 @@ impl Batch {
         configs: Vec<Py<Config>>,
         count: usize,
         threads: usize,
+        gpu: Option<bool>,
     ) -> PyResult<Self> {
         let all: Vec<_> =
             scenes.iter().zip(&configs).map(|(scene, config)| (&scene.get().0, &config.get().0)).collect();
-        made(py, threads, || match all[..] {
+        made(py, threads, gpu, || match all[..] {
             [(scene, config)] => drystone::batch::Batch::of(scene.constant_world()?, scene.dt, config, count),
             _ => {
                 let mut worlds = Vec::new();
@@ -117,8 +119,8 @@ impl Batch {
     }
 
     #[staticmethod]
-    fn of_states(py: Python<'_>, states: Vec<Py<State>>, threads: usize) -> PyResult<Self> {
-        made(py, threads, || drystone::batch::Batch::of_states(states.iter().map(|state| state.get().0.clone())))
+    fn of_states(py: Python<'_>, states: Vec<Py<State>>, threads: usize, gpu: Option<bool>) -> PyResult<Self> {
+        made(py, threads, gpu, || drystone::batch::Batch::of_states(states.iter().map(|state| state.get().0.clone())))
     }
 
     /// Number of worlds, and the largest numbers of bodies, joints and drives of a world.
@@ -128,6 +130,16 @@ impl Batch {
             batch.worlds().iter().map(|member| column.rows(&member.simulation().world)).max().unwrap_or(0)
         };
         (batch.len(), most(Column::Position), most(Column::JointSpeed), most(Column::Control))
+    }
+
+    #[getter]
+    fn backend(&self) -> &'static str {
+        self.lock().backend()
+    }
+
+    #[getter]
+    fn fault(&self) -> Option<String> {
+        self.lock().fault().map(str::to_owned)
     }
 
     #[getter]
@@ -457,15 +469,21 @@ impl Task<'_> {
 }
 
 /// Makes worlds on new threads: after a fork the threads of the process are gone.
+/// A batch on the CPU, or on a GPU: an exact one if `gpu` is true.
 fn made(
     py: Python<'_>,
     threads: usize,
+    gpu: Option<bool>,
     make: impl FnOnce() -> Outcome<drystone::batch::Batch> + Send,
 ) -> PyResult<Batch> {
     py.detach(|| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|error| drystone::Error::input(format!("num_threads = {threads}: {error}")))?;
-        pool.install(|| make()?.on_threads(threads))
+        pool.install(|| {
+            let batch = make()?.on_threads(threads)?;
+            let Some(exact) = gpu else { return Ok(batch) };
+            batch.on_backend(choose(BackendChoice::Gpu, 0, exact)?.0)
+        })
     })
     .map(|batch| Batch(Mutex::new(batch)))
     .map_err(raised)

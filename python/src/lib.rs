@@ -12,7 +12,7 @@ mod scene;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(drystone, InternalError, PyRuntimeError, "A defect of drystone.");
@@ -30,7 +30,8 @@ pub fn raised(error: drystone::Error) -> PyErr {
     match error {
         Error::Input(_) => PyValueError::new_err(line),
         Error::File { .. } => PyOSError::new_err(line),
-        Error::Adapter(_) => AdapterError::new_err(line),
+        Error::Adapter(_) | Error::Lost(_) => AdapterError::new_err(line),
+        Error::TooLarge(_) => PyMemoryError::new_err(line),
         Error::Panicked(_) => InternalError::new_err(line),
         _ => PyRuntimeError::new_err(line),
     }

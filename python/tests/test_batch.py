@@ -617,3 +617,29 @@ def test_a_picture_names_wrong_arguments(options: dict, line: str) -> None:
     with pytest.raises(ValueError) as caught:
         ds.Batch(ds.Scene.find("tower", n=1), 2).picture(**options)
     assert str(caught.value) == line
+
+
+def test_a_gpu_has_the_bits_of_the_cpu() -> None:
+    scenes = [ds.Scene.find("tower", n=5), ds.Scene.find("drawbridge"), ds.Scene.find("pile", n=27), ds.Scene.find("tower", n=4)]
+    cpu, gpu = ds.Batch(scenes), ds.Batch(scenes, backend="gpu", exact=True)
+    assert (cpu.backend, gpu.backend) == ("cpu", "gpu")
+    for batch in (cpu, gpu):
+        batch.force[0, 3] = (500, 0, 0)
+        batch.step(40)
+        batch.step(20, worlds=[0, 2])
+    assert (cpu.hash() == gpu.hash()).all() and gpu.fault is None
+    again = ds.Batch.load(gpu.save(), backend="gpu", exact=True)
+    again.step(5)
+    cpu.step(5)
+    assert (cpu.hash() == again.hash()).all()
+    plain = ds.Batch(scenes, backend="gpu")
+    plain.step(2)
+    cpu.reset()
+    cpu.step(2)
+    assert np.allclose(plain.position, cpu.position, atol=1e-4, equal_nan=True)
+
+
+@pytest.mark.parametrize(("arguments", "part"), [({"backend": "tpu"}, "must be one of 'cpu', 'gpu'"), ({"backend": 3}, "backend = 3"), ({"exact": 1}, "exact = 1: must be True or False")])
+def test_an_unknown_backend_is_refused(arguments: dict, part: str) -> None:
+    with pytest.raises(ValueError, match=part):
+        ds.Batch(ds.Scene.find("tower", n=2), **arguments)

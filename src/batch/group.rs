@@ -1,12 +1,14 @@
-//! Steps small worlds together, so that they fill the lanes of a processor.
+//! Steps worlds together: small ones, so that they fill the lanes of a processor, or all worlds on one device.
 
 use std::sync::atomic::Ordering;
+
+use rayon::prelude::*;
 
 use super::member::{Member, RunLength};
 use crate::backend::cpu::Cpu;
 use crate::backend::{Backend, CheckedStep};
 use crate::config::SolverConfig;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::panics;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::carry::Carry;
@@ -21,16 +23,41 @@ pub(super) const WORLDS: usize = 16;
 const MAX_BODIES: usize = 160;
 
 /// Several steps combined into one, in reusable memory.
-#[derive(Default)]
 pub(super) struct Group {
-    backend: Cpu,
+    backend: Box<dyn Backend>,
+    /// Whether the caller chose the backend: steps of any size run on it, and the worlds of the group are assembled and
+    /// stored on all threads.
+    is_chosen: bool,
+    /// One line if the chosen backend failed in this step, and if it failed in the last run.
+    fault: Option<String>,
+    pub last_fault: Option<String>,
     problem: StepProblem,
     plan: StepPlan,
     key: Option<MadeFor>,
 }
 
+impl Default for Group {
+    fn default() -> Self {
+        Self { is_chosen: false, ..Self::on(Box::new(Cpu::new())) }
+    }
+}
+
 /// The key, rules and settings of a plan.
-type MadeFor = (PlanKey, Alike, SolverConfig);
+type MadeFor = (PlanKey, Option<Alike>, SolverConfig);
+
+/// A world with the caller's value for it.
+pub(super) struct Job<'a, T> {
+    own: &'a mut T,
+    member: &'a mut Member,
+    stage: Stage,
+    alike: Option<Alike>,
+}
+
+impl<'a, T> Job<'a, T> {
+    pub fn new(own: &'a mut T, member: &'a mut Member) -> Self {
+        Self { own, member, stage: Stage::Still, alike: None }
+    }
+}
 
 /// The progress of a world in a step.
 #[derive(Clone, Copy, PartialEq)]
@@ -45,86 +72,132 @@ enum Stage {
     Ran,
 }
 
-/// Runs the steps of a run; see [`Batch::run`](super::Batch::run).
-pub(super) fn run<T>(
-    jobs: &mut [(&mut T, &mut Member)],
-    way: RunLength,
-    before: &impl Fn(&T, u64, &mut World) -> Result<()>,
-    after: &impl Fn(&mut T, u64, &Member),
-    group: &mut Group,
-) {
-    jobs.iter_mut().for_each(|(_, member)| member.begin_run());
-    let mut stages = vec![Stage::Still; jobs.len()];
-    for step in 0..way.steps {
-        if way.is_over.load(Ordering::Relaxed) || stages.iter().all(|stage| *stage == Stage::Out) {
-            break;
-        }
-        for ((own, member), stage) in jobs.iter_mut().zip(&mut stages).filter(|(_, stage)| **stage != Stage::Out) {
-            let change = |step, world: &mut World| before(own, step, world);
-            *stage = match member.begin_step(way.dt, |world| change(step, world)) {
-                Ok(true) => Stage::Assembled,
-                Ok(false) => Stage::Still,
-                Err(error) => {
-                    member.fail(error, step, way.dt, change);
-                    Stage::Out
-                }
-            };
-        }
-        group.run_alike(jobs, &mut stages);
-        for ((own, member), stage) in jobs.iter_mut().zip(&mut stages).filter(|(_, stage)| **stage != Stage::Out) {
-            let ended = match stage {
-                Stage::Assembled => member.end_step(way.dt, false),
-                Stage::Ran => member.end_step(way.dt, true),
-                _ => member.note_step(way.dt),
-            };
-            if let Err(error) = ended {
-                member.fail(error, step, way.dt, |step, world: &mut World| before(own, step, world));
-                *stage = Stage::Out;
-            } else {
-                after(own, step, member);
-            }
+impl Group {
+    /// A group that runs all its steps on one backend.
+    pub fn on(backend: Box<dyn Backend>) -> Self {
+        Self {
+            backend,
+            is_chosen: true,
+            fault: None,
+            last_fault: None,
+            problem: StepProblem::default(),
+            plan: StepPlan::default(),
+            key: None,
         }
     }
-}
 
-impl Group {
-    /// Runs equal kinds of steps together. A step without a match remains, to be run alone.
-    fn run_alike<T>(&mut self, jobs: &mut [(&mut T, &mut Member)], stages: &mut [Stage]) {
-        let small = |(member, stage): (&Member, &Stage)| {
-            let simulation = member.simulation();
-            let is_small = *stage == Stage::Assembled && simulation.problem().bodies.len() <= MAX_BODIES;
-            is_small.then(|| Alike::of(simulation.config(), simulation.problem())).flatten()
-        };
-        let alike: Vec<Option<Alike>> =
-            jobs.iter().zip(stages.iter()).map(|((_, member), stage)| small((member, stage))).collect();
+    /// The backend of the group.
+    pub fn backend(&self) -> &dyn Backend {
+        &*self.backend
+    }
+
+    /// Runs the steps of a run; see [`Batch::run`](super::Batch::run).
+    pub fn run<T: Send>(
+        &mut self,
+        jobs: &mut [Job<T>],
+        way: RunLength,
+        before: &(impl Fn(&T, u64, &mut World) -> Result<()> + Sync),
+        after: &(impl Fn(&mut T, u64, &Member) + Sync),
+    ) {
+        let on_threads = self.is_chosen;
+        self.last_fault = None;
+        each(jobs, on_threads, |job| job.member.begin_run());
+        for step in 0..way.steps {
+            if way.is_over.load(Ordering::Relaxed) || jobs.iter().all(|job| job.stage == Stage::Out) {
+                break;
+            }
+            let change = |own: &T, step, world: &mut World| before(own, step, world);
+            each(jobs, on_threads, |Job { own, member, stage, alike }| {
+                *alike = None;
+                if *stage == Stage::Out {
+                    return;
+                }
+                *stage = match member.begin_step(way.dt, |world| change(own, step, world)) {
+                    Ok(true) => Stage::Assembled,
+                    Ok(false) => Stage::Still,
+                    Err(error) => {
+                        member.fail(error, step, way.dt, |step, world| change(own, step, world));
+                        Stage::Out
+                    }
+                };
+                let simulation = member.simulation();
+                if *stage == Stage::Assembled && (on_threads || simulation.problem().bodies.len() <= MAX_BODIES) {
+                    *alike = Alike::of(simulation.config(), simulation.problem());
+                }
+            });
+            self.run_alike(jobs);
+            let fault = self.fault.take();
+            self.last_fault = fault.clone().or(self.last_fault.take());
+            each(jobs, on_threads, |Job { own, member, stage, .. }| {
+                let ended = match stage {
+                    Stage::Out => return,
+                    Stage::Assembled => member.end_step(way.dt, false),
+                    Stage::Ran => member.end_step(way.dt, true),
+                    Stage::Still => member.note_step(way.dt),
+                };
+                if let Err(error) = ended {
+                    member.fail(error, step, way.dt, |step, world| change(own, step, world));
+                    *stage = Stage::Out;
+                } else {
+                    member.note_fault(fault.as_ref());
+                    after(own, step, member);
+                }
+            });
+        }
+    }
+
+    /// Runs equal kinds of steps together. Without a chosen backend, a step without a match remains, to be run alone.
+    fn run_alike<T>(&mut self, jobs: &mut [Job<T>]) {
         for first in 0..jobs.len() {
-            let Some(kind) = alike[first].filter(|_| stages[first] == Stage::Assembled) else { continue };
-            let config = jobs[first].1.simulation().config().clone();
-            let is_of = |k: usize, member: &Member| alike[k] == Some(kind) && *member.simulation().config() == config;
-            let own: Vec<usize> = (first..jobs.len()).filter(|&k| is_of(k, jobs[k].1)).collect();
-            if own.len() < 2 {
+            if jobs[first].stage != Stage::Assembled || (jobs[first].alike.is_none() && !self.is_chosen) {
+                continue;
+            }
+            let (kind, config) = (jobs[first].alike, jobs[first].member.simulation().config().clone());
+            let is_of = |k: usize| {
+                let Job { member, stage, alike, .. } = &jobs[k];
+                let is_alike = *stage == Stage::Assembled && alike.is_some() && *alike == kind;
+                k == first || is_alike && *member.simulation().config() == config
+            };
+            let own: Vec<usize> = (first..jobs.len()).filter(|&k| is_of(k)).collect();
+            if own.len() < 2 && !self.is_chosen {
                 continue;
             }
             let chosen = jobs.iter_mut().enumerate().filter(|(k, _)| own.binary_search(k).is_ok());
             let mut problems: Vec<&mut StepProblem> =
-                chosen.map(|(_, job)| job.1.simulation_mut().problem_mut()).collect();
+                chosen.map(|(_, job)| job.member.simulation_mut().problem_mut()).collect();
             let ran = panics::caught(|| self.run_as_one(&mut problems, &config, kind));
-            debug_assert!(matches!(ran, Ok(Ok(()))), "steps of one kind do not run as one");
             // If that failed, each world runs its own step, which is unchanged.
-            if let Ok(Ok(())) = ran {
-                own.into_iter().for_each(|k| stages[k] = Stage::Ran);
-            } else {
-                *self = Self::default();
+            match ran {
+                Ok(Ok(())) => own.into_iter().for_each(|k| jobs[k].stage = Stage::Ran),
+                Ok(Err(error)) if self.is_chosen => return self.replace_backend(&error),
+                _ => {
+                    debug_assert!(false, "steps of one kind do not run as one");
+                    *self = Self::default();
+                }
             }
         }
     }
 
-    fn run_as_one(&mut self, problems: &mut [&mut StepProblem], config: &SolverConfig, kind: Alike) -> Result<()> {
-        let Self { backend, problem, plan, key } = self;
+    /// Continues on another backend after the chosen one failed.
+    fn replace_backend(&mut self, error: &Error) {
+        let successor = if error.is_lost() { self.backend.successor() } else { None };
+        let next = Self::on(successor.unwrap_or_else(|| Box::new(Cpu::new())));
+        let fault = format!("{error}; the worlds repeated the step, and continue on {}", next.backend.name());
+        *self = Self { fault: Some(fault), last_fault: self.last_fault.take(), ..next };
+    }
+
+    fn run_as_one(
+        &mut self,
+        problems: &mut [&mut StepProblem],
+        config: &SolverConfig,
+        kind: Option<Alike>,
+    ) -> Result<()> {
+        let Self { backend, problem, plan, key, .. } = self;
         join(problems, problem);
         let is_of =
             |(of_plan, of_kind, of_config): &MadeFor| *of_kind == kind && of_config == config && of_plan.is_of(problem);
-        if !key.as_ref().is_some_and(is_of) {
+        // Without known facts about its rules, a plan serves one step.
+        if kind.is_none() || !key.as_ref().is_some_and(is_of) {
             *plan = StepPlan::with_summary(config, problem, &ContactSummary::of(problem));
             *key = Some((PlanKey::of(problem), kind, config.clone()));
         }
@@ -133,4 +206,9 @@ impl Group {
         part(problem, problems);
         Ok(())
     }
+}
+
+/// Calls a function on all jobs, on all threads of the pool or on this one.
+fn each<T: Send>(jobs: &mut [Job<T>], on_threads: bool, work: impl Fn(&mut Job<T>) + Sync) {
+    if on_threads { jobs.par_iter_mut().for_each(&work) } else { jobs.iter_mut().for_each(work) }
 }

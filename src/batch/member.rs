@@ -183,6 +183,13 @@ impl Member {
         Ok(())
     }
 
+    /// Records the fault of a device that the last step shared with others.
+    pub(super) fn note_fault(&mut self, fault: Option<&String>) {
+        if fault.is_some() {
+            self.stats.fault = fault.cloned();
+        }
+    }
+
     /// Restores the state before the failed step, and records the error.
     pub(super) fn fail(
         &mut self,

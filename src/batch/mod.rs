@@ -44,13 +44,14 @@ use std::time::Duration;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::backend::Backend;
 use crate::config::SolverConfig;
 use crate::error::{Result, ensure, input};
 use crate::world::World;
 
 pub use column::{Column, DriveOf, drives, write};
 pub use contacts::{Contacts, EventRow};
-use group::Group;
+use group::{Group, Job};
 pub use member::Member;
 use member::RunLength;
 pub use state::State;
@@ -67,6 +68,8 @@ pub struct Batch {
     threads: usize,
     /// Memory for groups of worlds.
     groups: Mutex<Vec<Group>>,
+    /// The group of all worlds on a backend of the caller's choice.
+    chosen: Option<Group>,
 }
 
 /// The length of a run of [`Batch::run`].
@@ -130,7 +133,7 @@ impl Batch {
 
     fn of_members(members: Vec<Member>) -> Result<Self> {
         ensure(!members.is_empty(), || "a batch of 0 worlds: must be at least one".to_owned())?;
-        Self { members, pools: Vec::new(), threads: 0, groups: Mutex::default() }.on_threads(0)
+        Self { members, pools: Vec::new(), threads: 0, groups: Mutex::default(), chosen: None }.on_threads(0)
     }
 
     /// Sets the number of threads, or 0 for the size of the caller's pool. No result depends on it.
@@ -139,12 +142,60 @@ impl Batch {
     /// The system cannot start that many threads.
     pub fn on_threads(mut self, threads: usize) -> Result<Self> {
         self.threads = if threads == 0 { rayon::current_num_threads() } else { threads };
-        let is_enough = self.members.len() >= self.threads;
+        // On one backend, all threads assemble and store the steps of all worlds.
+        let is_enough = self.members.len() >= self.threads && self.chosen.is_none();
         let (pools, each) = if is_enough { (self.threads, 1) } else { (1, self.threads) };
         let pool = |_| ThreadPoolBuilder::new().num_threads(each).build();
         let made: std::result::Result<_, _> = (0..pools).map(pool).collect();
         self.pools = made.map_err(|error| input!("threads = {threads}: {error}"))?;
         Ok(self)
+    }
+
+    /// Runs the steps of all worlds on one backend, such as a GPU: in each step, worlds with equal settings and rules are
+    /// one problem. Without this call, each group of up to sixteen worlds runs on one thread of the CPU. Each step sends
+    /// all rows to a device; a [`Simulation`](crate::Simulation) of worlds [beside](World::beside) each other keeps them
+    /// there, but steps all of its worlds.
+    ///
+    /// A world has the bits that it has on this backend alone, so those of the CPU on a GPU in exact mode. A world that
+    /// fails repeats its earlier steps on the CPU. If the device is lost, or the problem is too large for it, each world
+    /// repeats the step on the CPU, and the batch continues on another backend: [`Self::fault`] and
+    /// [`StepStats::fault`] say so.
+    ///
+    /// ```
+    /// use drystone::batch::Batch;
+    /// use drystone::{Reference, SolverConfig};
+    /// use drystone_scenes::Scene;
+    ///
+    /// let scene = Scene::find("tower", &["n=3".into()])?;
+    /// let batch = || Batch::of(&scene.world, scene.dt, &SolverConfig::default(), 4);
+    /// let mut on_reference = batch()?.on_backend(Box::new(Reference::<f32>::new()))?;
+    /// let mut on_cpu = batch()?;
+    /// assert_eq!((on_reference.backend(), on_cpu.backend()), ("reference", "cpu"));
+    /// on_reference.step(10, &[0, 2])?;
+    /// on_cpu.step(10, &[0, 1, 2, 3])?;
+    /// assert!(on_reference.fault().is_none() && on_reference.world(2).hash() == on_cpu.world(2).hash());
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// [`StepStats::fault`]: crate::StepStats::fault
+    ///
+    /// # Errors
+    /// Those of [`Self::on_threads`].
+    pub fn on_backend(mut self, backend: Box<dyn Backend>) -> Result<Self> {
+        self.chosen = Some(Group::on(backend));
+        let threads = self.threads;
+        self.on_threads(threads)
+    }
+
+    /// The name of the backend: `cpu`, or that of the backend that [`Self::on_backend`] chose.
+    pub fn backend(&self) -> &'static str {
+        self.chosen.as_ref().map_or("cpu", |group| group.backend().name())
+    }
+
+    /// One line if the chosen backend failed in the last run: the reason, and the backend that continues. It is `None` if
+    /// there was no failure.
+    pub fn fault(&self) -> Option<&str> {
+        self.chosen.as_ref().and_then(|group| group.last_fault.as_deref())
     }
 
     /// The number of worlds.
@@ -202,7 +253,8 @@ impl Batch {
     /// can read it after each step. Both get the number of the step, from 0. Returns the worlds that failed, in
     /// ascending order.
     ///
-    /// Up to sixteen worlds run as a group on one thread, and wait for no other world. If a step fails, `before` is
+    /// Up to sixteen worlds run as a group on one thread, and wait for no other world; on a chosen backend, all worlds
+    /// wait for each other. If a step fails, `before` is
     /// called again for the steps before it, and has to make the same changes again.
     ///
     /// ```
@@ -241,15 +293,20 @@ impl Batch {
         let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
         self.check(chosen.iter().copied())?;
         // As many worlds in a group as fill the lanes, and at least one group for each thread.
-        let each = chosen.len().div_ceil(self.threads).clamp(1, group::WORLDS);
-        let Self { members, pools, groups, .. } = self;
-        let mut jobs = named(members, &mut tasks);
-        let work = |jobs: &mut [(&mut T, &mut Member)]| {
-            let mut group = lock(groups).pop().unwrap_or_default();
-            group::run(jobs, way, &before, &after, &mut group);
-            lock(groups).push(group);
+        let Self { members, pools, threads, groups, chosen: on_one } = self;
+        let each = if on_one.is_some() { chosen.len() } else { chosen.len().div_ceil(*threads).min(group::WORLDS) };
+        let mut jobs: Vec<_> =
+            named(members, &mut tasks).into_iter().map(|(own, member)| Job::new(own, member)).collect();
+        let on_one = on_one.as_mut().map(Mutex::new);
+        let work = |jobs: &mut [Job<T>]| match &on_one {
+            Some(group) => lock(group).run(jobs, way, &before, &after),
+            None => {
+                let mut group = lock(groups).pop().unwrap_or_default();
+                group.run(jobs, way, &before, &after);
+                lock(groups).push(group);
+            }
         };
-        spread(pools, jobs.chunks_mut(each).collect(), &work, &meanwhile);
+        spread(pools, jobs.chunks_mut(each.max(1)).collect(), &work, &meanwhile);
         Ok(chosen.into_iter().filter(|&world| self.members[world].error().is_some()).collect())
     }
 

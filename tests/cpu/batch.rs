@@ -395,3 +395,38 @@ fn a_joint_that_breaks_leaves_its_columns_empty() {
     batch.world(0).read(Column::JointSpeed, &mut speed);
     assert!(speed.iter().all(|x| x.is_nan()));
 }
+
+/// A backend that counts its steps.
+struct Counting(std::sync::Arc<std::sync::atomic::AtomicUsize>, Cpu);
+
+impl drystone::Backend for Counting {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn adapter(&self) -> String {
+        self.1.adapter()
+    }
+
+    fn run_checked(&mut self, step: drystone::stages::backend::CheckedStep) -> Result<()> {
+        self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.1.run_checked(step)
+    }
+}
+
+/// Worlds of any size with equal rules are one problem on a backend that the caller chose.
+#[test]
+fn equal_worlds_are_one_problem_of_a_chosen_backend() {
+    let config = SolverConfig::default().without_sleep();
+    let piles = [scene("pile", &["n=300"]), scene("pile", &["n=300", "seed=5"])];
+    let worlds = || piles.iter().cycle().take(6).map(|scene| (&scene.world, scene.dt, config.clone()));
+    let steps = std::sync::Arc::default();
+    let chosen = Box::new(Counting(std::sync::Arc::clone(&steps), Cpu::new()));
+    let mut together = Batch::new(worlds()).and_then(|batch| batch.on_backend(chosen)).expect("good worlds");
+    let mut apart = Batch::new(worlds()).expect("good worlds");
+    let all = [0, 1, 2, 3, 4, 5];
+    assert_eq!(hashes(&mut together, &all, 20), hashes(&mut apart, &all, 20));
+    // In the first step all fall, and friction begins in all worlds within a step or two of each other.
+    let steps = steps.load(std::sync::atomic::Ordering::Relaxed);
+    assert!((20..30).contains(&steps), "{steps} steps of the backend");
+}

@@ -8,6 +8,7 @@ mod common;
 #[allow(dead_code)]
 mod laws;
 
+mod batches;
 mod breaking;
 mod closed_forms;
 mod cones;
@@ -43,6 +44,7 @@ mod waits;
 
 fn main() -> std::process::ExitCode {
     common::harness::run([
+        batches::tests(),
         breaking::tests(),
         closed_forms::tests(),
         cones::tests(),

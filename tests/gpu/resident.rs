@@ -426,6 +426,18 @@ fn a_device_takes_rows_of_another_layout() {
             material.spinning_friction = spinning_friction;
             material.rolling_friction = if (10..25).contains(&step) { 0.02 } else { 0.0 };
         });
+        // A body that comes and goes brings the rolling friction: no other row is written again because of it.
+        same_on_a_device(sliding(), &SolverConfig::default().without_sleep(), 40, |step, world| {
+            world.bodies[0].material.spinning_friction = spinning_friction;
+            if step == 10 {
+                let mut ball = Body::dynamic().shape(Shape::ball(0.5)).position(-3.0, 0.5, 0.0);
+                ball.material.rolling_friction = 0.02;
+                world.insert(ball);
+            } else if step == 25 {
+                let ball = world.bodies.handles().last().expect("the ball");
+                world.remove(ball);
+            }
+        });
     }
 }
 
