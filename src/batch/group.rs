@@ -36,12 +36,6 @@ pub(super) struct Group {
     key: Option<MadeFor>,
 }
 
-impl Default for Group {
-    fn default() -> Self {
-        Self { is_chosen: false, ..Self::on(Box::new(Cpu::new())) }
-    }
-}
-
 /// The key, rules and settings of a plan.
 type MadeFor = (PlanKey, Option<Alike>, SolverConfig);
 
@@ -73,6 +67,11 @@ enum Stage {
 }
 
 impl Group {
+    /// A group of small worlds in the lanes of a processor.
+    pub fn in_lanes() -> Self {
+        Self { is_chosen: false, ..Self::on(Box::new(Cpu::new())) }
+    }
+
     /// A group that runs all its steps on one backend.
     pub fn on(backend: Box<dyn Backend>) -> Self {
         Self {
@@ -172,7 +171,7 @@ impl Group {
                 Ok(Err(error)) if self.is_chosen => return self.replace_backend(&error),
                 _ => {
                     debug_assert!(false, "steps of one kind do not run as one");
-                    *self = Self::default();
+                    *self = Self::in_lanes();
                 }
             }
         }

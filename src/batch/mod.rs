@@ -301,7 +301,7 @@ impl Batch {
         let work = |jobs: &mut [Job<T>]| match &on_one {
             Some(group) => lock(group).run(jobs, way, &before, &after),
             None => {
-                let mut group = lock(groups).pop().unwrap_or_default();
+                let mut group = lock(groups).pop().unwrap_or_else(Group::in_lanes);
                 group.run(jobs, way, &before, &after);
                 lock(groups).push(group);
             }

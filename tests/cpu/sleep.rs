@@ -434,13 +434,9 @@ fn what_is_tied_to_a_body_that_moves_wakes() {
                 let joint = tied(Joint::new(load, Vec3::Y * 2.0, hand, Vec3::ZERO));
                 let Joint { body_a, anchor_a, anchor_b, .. } = joint;
                 world.insert_joint(match swap {
-                    true => Joint {
-                        body_a: hand.into(),
-                        body_b: Some(body_a),
-                        anchor_a: anchor_b,
-                        anchor_b: anchor_a,
-                        ..joint
-                    },
+                    true => {
+                        Joint { body_a: hand, body_b: Some(body_a), anchor_a: anchor_b, anchor_b: anchor_a, ..joint }
+                    }
                     false => joint,
                 });
                 let mut simulation = simulation(world, sleepy());
