@@ -71,7 +71,7 @@ struct Unfinished {
 /// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
 /// let lamp = world.insert(Body::dynamic().shape(Shape::ball(0.1)).total_mass(2.0).position(3.0, 2.0, 0.0));
-/// world.insert_joint(Joint::to_world(lamp, Vec3::Y, Vec3::new(3.0, 3.0, 0.0)).hinge(Vec3::Z));
+/// let hinge = world.insert_joint(Joint::to_world(lamp, Vec3::Y, Vec3::new(3.0, 3.0, 0.0)).hinge(Vec3::Z));
 /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
 /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// assert!(simulation.listening().impulses);
@@ -84,8 +84,8 @@ struct Unfinished {
 /// assert!(simulation.solved_penetration().max < 1e-3 && simulation.penetration().max < 1e-3);
 /// assert_eq!((simulation.contacts().count(), simulation.overlaps().len()), (1, 0));
 /// // Joints: the lamp hangs on its hinge.
-/// assert!((simulation.joint_impulses()[0].length() * 480.0 - 19.62).abs() < 0.1);
-/// assert!(simulation.joint_angular_impulses()[0].length() < 1e-3);
+/// assert!((simulation.joint_impulse(hinge).expect("it hangs").length() * 480.0 - 19.62).abs() < 0.1);
+/// assert!(simulation.joint_angular_impulse(hinge).expect("it hangs").length() < 1e-3);
 /// // Bodies at rest sleep, and take the substeps of the settings.
 /// assert!(simulation.is_asleep(brick) && simulation.substeps_of(brick) == simulation.config().substeps);
 /// simulation.wake(brick);
@@ -365,7 +365,7 @@ impl Simulation {
             let successor = if error.is_lost() { self.backend.successor() } else { None };
             self.repeat_step(error, successor, dt, stats)?;
         }
-        self.store_step(dt, stats);
+        self.store_step(dt, stats, true);
         Ok(())
     }
 
@@ -380,16 +380,18 @@ impl Simulation {
             let successor = if error.is_lost() { self.backend.successor_async().await } else { None };
             self.repeat_step(error, successor, dt, stats)?;
         }
-        self.store_step(dt, stats);
+        self.store_step(dt, stats, true);
         Ok(())
     }
 
-    /// Stores the results of the step that ran.
-    pub(crate) fn store_step(&mut self, dt: f32, stats: &mut StepStats) {
+    /// Stores the results of the step that ran, on the backend of this simulation or on another one.
+    pub(crate) fn store_step(&mut self, dt: f32, stats: &mut StepStats, on_own_backend: bool) {
         let stages = &mut self.stages;
-        self.on_device = self.backend.keeps_rows();
-        stats.traffic = self.backend.traffic();
-        stats.kernels.extend_from_slice(self.backend.kernel_times());
+        self.on_device = on_own_backend && self.backend.keeps_rows();
+        if on_own_backend {
+            stats.traffic = self.backend.traffic();
+            stats.kernels.extend_from_slice(self.backend.kernel_times());
+        }
         let taken = timed(&mut stats.times.store, || stages.store(&mut self.world, dt));
         (stats.energy_taken, stats.refused) = (taken.energy, taken.refused);
         self.state = next_state();
@@ -594,17 +596,16 @@ impl Simulation {
         self.stages.joint_load(&self.world, joint).map(|[_, torque]| torque)
     }
 
-    /// Impulse of each joint on its body b in the last substep ([`Self::substeps_of`]), in world axes (N s).
-    pub fn joint_impulses(&self) -> Vec<glam::Vec3> {
-        let problem = &self.stages.problem;
-        (0..problem.joints.len()).map(|joint| problem.joint_impulse(&problem.joint_impulses, joint)).collect()
+    /// Impulse of a joint on its body b in the last substep ([`Self::substeps_of`]), in world axes (N s). `None` where
+    /// [`Self::joint_force`] is.
+    pub fn joint_impulse(&self, joint: JointHandle) -> Option<glam::Vec3> {
+        self.stages.joint_impulse(&self.world, joint).map(|[impulse, _]| impulse)
     }
 
-    /// Angular impulse of each joint on its body b about the anchor in the last substep, in world axes (N m s). It sums
-    /// the locks, limits, motors and springs of angles. Divide by the length of the substep for a torque (N m).
-    pub fn joint_angular_impulses(&self) -> Vec<glam::Vec3> {
-        let problem = &self.stages.problem;
-        (0..problem.joints.len()).map(|joint| problem.axis_impulse(&problem.joint_impulses, joint, false)).collect()
+    /// Angular impulse of a joint on its body b about the anchor in the last substep, in world axes (N m s). It sums the
+    /// locks, limits, motors and springs of angles. Divide by the length of the substep for a torque (N m).
+    pub fn joint_angular_impulse(&self, joint: JointHandle) -> Option<glam::Vec3> {
+        self.stages.joint_impulse(&self.world, joint).map(|[_, angular]| angular)
     }
 
     /// Sets the settings for the next step and later ones.

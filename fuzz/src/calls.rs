@@ -264,7 +264,10 @@ impl Game {
             let [a, b] = [contact.a, contact.b].map(|side| simulation.world.body(side.body).is_some());
             assert!(a && b, "a contact of a body that is gone: {contact:?}");
         }
-        let _ = (simulation.penetration(), simulation.solved_penetration(), simulation.joint_impulses());
+        for &joint in simulation.world.joints.handles() {
+            let _ = (simulation.joint_impulse(joint), simulation.joint_force(joint));
+        }
+        let _ = (simulation.penetration(), simulation.solved_penetration());
         let _ = (simulation.world.kinetic_energy(), simulation.world.joint_gap(), simulation.manifolds().count());
     }
 }

@@ -314,9 +314,9 @@ class Batch:
         if not is_one:
             of_scenes = of_scenes * (count if len(of_scenes) == 1 else 1)
             of_configs = of_configs * (count if len(of_configs) == 1 else 1)
-        batch = _drystone.Batch.of_scenes(of_scenes, of_configs, count, threads, gpu)
-        words = _listen(batch, listen, hits_above)
-        if words:
+        words = _check.words("listen", listen, LISTEN)
+        batch = _drystone.Batch.of_scenes(of_scenes, of_configs, count, threads, None if words else gpu)
+        if _listen(batch, words, hits_above):
             # The start states must listen too, because a reset restores them.
             batch = _drystone.Batch.of_states(batch.states(np.arange(count)), threads, gpu)
         self._begin(batch, "impulses" in words, scenes * (count if len(scenes) == 1 else 1))
@@ -349,7 +349,7 @@ class Batch:
         own = cls.__new__(cls)
         snapshots = states if isinstance(states, Snapshots) else Snapshots.from_bytes(states)
         threads, gpu = _threads(num_threads), _gpu(backend, exact)
-        batch = _drystone.Batch.of_states(snapshots._states, threads, gpu)
+        batch = _drystone.Batch.of_states(snapshots._states, threads, None if listen is not None else gpu)
         words = ["impulses"]
         if listen is not None:
             words = _listen(batch, listen, hits_above)
@@ -365,6 +365,8 @@ class Batch:
         self._has_impulses = has_impulses
         self._lock = threading.RLock()
         self._worlds, self._bodies, self._joints, self._drives = batch.sizes()
+        self._threads, self._backend = batch.threads, batch.backend
+        self._fault: str | None = None
         self._arrays = {name: np.full(self._shape(name), np.nan, np.float32) for name in (*VIEWS, *INPUTS)}
         self._views = {name: _read_only(self._arrays[name]) for name in VIEWS}
         self._inputs = [(name, self._arrays[name]) for name in INPUTS]
@@ -395,6 +397,23 @@ class Batch:
         with self._lock:
             return work()
 
+    def _steps_alone(self, work: Callable[[], Result]) -> Result:
+        """Call `work`, which steps worlds, and forget the fault of the call before."""
+
+        def all_work() -> Result:
+            self._fault = None
+            return work()
+
+        return self._alone(all_work)
+
+    def _finish(self, failed: list[tuple[int, str]], records: dict[str, NDArray[Any]]) -> None:
+        """Warn of a fault of the GPU, and raise the errors of worlds, at the end of a public call."""
+        try:
+            if self._fault is not None:
+                warnings.warn(self._fault, RuntimeWarning, stacklevel=3)
+        finally:
+            _raise_failed(failed, records)
+
     @property
     def num_worlds(self) -> int:
         """Number of worlds, W."""
@@ -418,17 +437,17 @@ class Batch:
     @property
     def num_threads(self) -> int:
         """Number of threads that step worlds."""
-        return self._batch.threads
+        return self._threads
 
     @property
     def backend(self) -> str:
         """The backend that steps worlds: "cpu" or "gpu"."""
-        return self._batch.backend
+        return self._backend
 
     @property
     def fault(self) -> str | None:
         """One line if the GPU failed in the last call that stepped: the reason, and the backend that continues."""
-        return self._batch.fault
+        return self._fault
 
     @property
     def position(self) -> Floats:
@@ -643,7 +662,7 @@ class Batch:
         n = _check.whole("n", n)
         chosen = _check.worlds(worlds, self._worlds)
         length = None if dt is None else _step_length(dt)
-        _raise_failed(self._alone(lambda: self._run_alone(n, 1, chosen, length, None, {})), {})
+        self._finish(self._steps_alone(lambda: self._run_alone(n, 1, chosen, length, None, {})), {})
 
     def rollout(
         self,
@@ -689,10 +708,10 @@ class Batch:
         given = self._given(names, out, len(chosen), n // every)
         records = {name: given.get(name, self._record(name, len(chosen), n // every)) for name in names}
         if until is None:
-            failed = self._alone(lambda: self._run_alone(n, every, chosen, length, numbers, records))
+            failed = self._steps_alone(lambda: self._run_alone(n, every, chosen, length, numbers, records))
         else:
-            failed = self._alone(lambda: self._run_until(n, every, chosen, length, numbers, records, until))
-        _raise_failed(failed, records)
+            failed = self._steps_alone(lambda: self._run_until(n, every, chosen, length, numbers, records, until))
+        self._finish(failed, records)
         return records
 
     def _given(
@@ -744,8 +763,7 @@ class Batch:
         failed: list[tuple[int, str]] | None = None
         try:
             failed = self._batch.run(n, every, chosen, dt, self._inputs, self._outputs, ctrl, list(records.items()))
-            if self._batch.fault is not None:
-                warnings.warn(self._batch.fault, RuntimeWarning, stacklevel=4)
+            self._fault, self._backend = self._batch.fault or self._fault, self._batch.backend
         finally:
             # Read the state of worlds that did not complete the call.
             late = chosen if failed is None else np.array([world for world, _ in failed], np.int64)

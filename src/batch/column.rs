@@ -128,8 +128,8 @@ impl Column {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveOf {
-    /// Index of the joint.
-    pub joint: usize,
+    /// The joint.
+    pub joint: JointHandle,
     /// Index of the axis.
     pub axis: usize,
     /// The joint, its bodies by name, and the axis if the joint has several drives.
@@ -138,14 +138,14 @@ pub struct DriveOf {
 
 /// The driven axes of a world, in the order of its joints.
 pub fn drives(world: &World) -> impl Iterator<Item = DriveOf> + '_ {
-    world.joints.iter().enumerate().flat_map(move |(index, joint)| {
+    world.joints.iter().zip(world.joints.handles()).enumerate().flat_map(move |(index, (joint, &handle))| {
         let own: Vec<usize> = driven(joint).collect();
         let is_one = own.len() == 1;
         own.into_iter().map(move |axis| {
             let bodies = name_of(world, joint);
             let name =
                 format!("joint {index}: {bodies}") + &if is_one { String::new() } else { format!(", axis {axis}") };
-            DriveOf { joint: index, axis, name }
+            DriveOf { joint: handle, axis, name }
         })
     })
 }
@@ -187,6 +187,9 @@ impl Member {
         out.fill(f32::NAN);
         let world = &self.simulation().world;
         let rows = out.chunks_exact_mut(column.width());
+        let joints = |of: &dyn Fn(JointHandle) -> Option<Vec3>| -> Vec<Option<[f32; 3]>> {
+            world.joints.handles().iter().map(|&joint| of(joint).map(|v| v.to_array())).collect()
+        };
         let bodies = || world.bodies.iter().enumerate().map(|(i, body)| (!world.bodies.is_vacant(i)).then_some(body));
         match column {
             Column::Position => put(rows, bodies().map(|b| b.map(|b| b.position.to_array()))),
@@ -205,18 +208,10 @@ impl Member {
             Column::Control => put(rows, world.joints.iter().flat_map(aims).map(|aim| Some([aim]))),
             Column::JointPosition => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).position))),
             Column::JointSpeed => put(rows, world.joints.iter().map(|j| Some(world.joint_motion(j).speed))),
-            Column::JointForce => {
-                let force = |&joint: &JointHandle| self.simulation().joint_force(joint);
-                put(rows, world.joints.handles().iter().map(|joint| force(joint).map(|v| v.to_array())));
-            }
-            Column::JointTorque => {
-                let torque = |&joint: &JointHandle| self.simulation().joint_torque(joint);
-                put(rows, world.joints.handles().iter().map(|joint| torque(joint).map(|v| v.to_array())));
-            }
-            Column::JointImpulse => put(rows, self.simulation().joint_impulses().iter().map(|v| Some(v.to_array()))),
-            Column::JointTorqueImpulse => {
-                put(rows, self.simulation().joint_angular_impulses().iter().map(|v| Some(v.to_array())));
-            }
+            Column::JointForce => put(rows, joints(&|joint| self.simulation().joint_force(joint))),
+            Column::JointTorque => put(rows, joints(&|joint| self.simulation().joint_torque(joint))),
+            Column::JointImpulse => put(rows, joints(&|joint| self.simulation().joint_impulse(joint))),
+            Column::JointTorqueImpulse => put(rows, joints(&|joint| self.simulation().joint_angular_impulse(joint))),
         }
     }
 

@@ -99,7 +99,6 @@ impl Group {
         after: &(impl Fn(&mut T, u64, &Member) + Sync),
     ) {
         let on_threads = self.is_chosen;
-        self.last_fault = None;
         each(jobs, on_threads, |job| job.member.begin_run());
         for step in 0..way.steps {
             if way.is_over.load(Ordering::Relaxed) || jobs.iter().all(|job| job.stage == Stage::Out) {
@@ -128,6 +127,7 @@ impl Group {
             let fault = self.fault.take();
             self.last_fault = fault.clone().or(self.last_fault.take());
             each(jobs, on_threads, |Job { own, member, stage, .. }| {
+                let repeats = *stage == Stage::Assembled;
                 let ended = match stage {
                     Stage::Out => return,
                     Stage::Assembled => member.end_step(way.dt, false),
@@ -138,7 +138,7 @@ impl Group {
                     member.fail(error, step, way.dt, |step, world| change(own, step, world));
                     *stage = Stage::Out;
                 } else {
-                    member.note_fault(fault.as_ref());
+                    member.note_fault(fault.as_ref().filter(|_| repeats));
                     after(own, step, member);
                 }
             });
@@ -169,6 +169,7 @@ impl Group {
             match ran {
                 Ok(Ok(())) => own.into_iter().for_each(|k| jobs[k].stage = Stage::Ran),
                 Ok(Err(error)) if self.is_chosen => return self.replace_backend(&error),
+                Err(panic) if self.is_chosen => return self.replace_backend(&Error::Panicked(panic.text)),
                 _ => {
                     debug_assert!(false, "steps of one kind do not run as one");
                     *self = Self::in_lanes();

@@ -1,8 +1,8 @@
 //! Many worlds at once. Each has its own scene, settings, start state, time, step count, error and hash.
 //!
 //! The bits of a world depend only on its scene, settings and inputs. They do not depend on the number of worlds, the
-//! other worlds, the order of calls to others, the number of threads, or the machine. A call does not change worlds
-//! that it does not name. If a world fails, only that world stops, in the state before the failed step; the others
+//! other worlds, the order of calls to others, the number of threads, or the machine. (On a GPU without exact mode,
+//! rounding may depend on the number of worlds, too.) A call does not change worlds that it does not name. If a world fails, only that world stops, in the state before the failed step; the others
 //! finish.
 //!
 //! ```
@@ -156,10 +156,10 @@ impl Batch {
     /// all rows to a device; a [`Simulation`](crate::Simulation) of worlds [beside](World::beside) each other keeps them
     /// there, but steps all of its worlds.
     ///
-    /// A world has the bits that it has on this backend alone, so those of the CPU on a GPU in exact mode. A world that
-    /// fails repeats its earlier steps on the CPU. If the device is lost, or the problem is too large for it, each world
-    /// repeats the step on the CPU, and the batch continues on another backend: [`Self::fault`] and
-    /// [`StepStats::fault`] say so.
+    /// On a GPU in exact mode, every world has the bits of the CPU. A world that fails repeats the earlier steps of the
+    /// run on the CPU. If the backend fails, because its device is lost or the problem is too large for it, each world
+    /// repeats the step on the CPU, and the batch continues on another backend, whatever the options of the first:
+    /// [`Self::fault`] and [`StepStats::fault`] say so.
     ///
     /// ```
     /// use drystone::batch::Batch;
@@ -289,7 +289,12 @@ impl Batch {
     ) -> Result<Vec<usize>> {
         let is_over = AtomicBool::new(false);
         let way = RunLength { steps: run.steps, dt: run.dt, is_over: &is_over };
-        let meanwhile = || is_over.store(run.stop.is_some_and(|stop| stop()), Ordering::Relaxed);
+        // A request to stop lasts: `stop` may report it once.
+        let meanwhile = || {
+            if run.stop.is_some_and(|stop| stop()) {
+                is_over.store(true, Ordering::Relaxed);
+            }
+        };
         let chosen: Vec<usize> = tasks.iter().map(|task| task.0).collect();
         self.check(chosen.iter().copied())?;
         // As many worlds in a group as fill the lanes, and at least one group for each thread.
@@ -297,6 +302,7 @@ impl Batch {
         let each = if on_one.is_some() { chosen.len() } else { chosen.len().div_ceil(*threads).min(group::WORLDS) };
         let mut jobs: Vec<_> =
             named(members, &mut tasks).into_iter().map(|(own, member)| Job::new(own, member)).collect();
+        on_one.iter_mut().for_each(|group| group.last_fault = None);
         let on_one = on_one.as_mut().map(Mutex::new);
         let work = |jobs: &mut [Job<T>]| match &on_one {
             Some(group) => lock(group).run(jobs, way, &before, &after),

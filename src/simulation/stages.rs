@@ -440,6 +440,15 @@ impl Stages {
         Some([problem.joint_impulse(impulses, row), problem.axis_impulse(impulses, row, false)].map(|j| j / time))
     }
 
+    /// Impulse and angular impulse of a joint on its body b in the last substep.
+    pub fn joint_impulse(&self, world: &World, joint: JointHandle) -> Option<[Vec3; 2]> {
+        let Self { joints, problem, .. } = self;
+        // A loaded state has no rows before its next step.
+        let row = joints.row_of(world, joint).filter(|&row| row < problem.joints.len())?;
+        let impulses = &problem.joint_impulses;
+        Some([problem.joint_impulse(impulses, row), problem.axis_impulse(impulses, row, false)])
+    }
+
     /// Removes the joints that carried more than their break force in the step.
     fn break_joints(&mut self, world: &mut World, dt: f32) {
         let first = self.events.all.len();

@@ -1,7 +1,8 @@
 //! The scalar backend, and the state of bodies as bits. Each set of tests uses a part of it.
 #![allow(dead_code)]
 
-use drystone::{Backend, Body, Reference, World};
+use drystone::glam::Vec3;
+use drystone::{Backend, Body, Reference, Simulation, World};
 
 /// Opens the scalar backend.
 pub fn reference() -> Box<dyn Backend> {
@@ -23,4 +24,16 @@ pub fn bits(world: &World, bodies: impl IntoIterator<Item = usize>) -> Vec<[u32;
 /// The same of all bodies of a world.
 pub fn all_bits(world: &World) -> Vec<[u32; 13]> {
     bits(world, 0..world.bodies.len())
+}
+
+/// The impulses of all joints in the last substep (N s); zero of those that took part in none.
+pub fn joint_impulses(simulation: &Simulation) -> Vec<Vec3> {
+    let joints = simulation.world.joints.handles().iter();
+    joints.map(|&joint| simulation.joint_impulse(joint).unwrap_or_default()).collect()
+}
+
+/// The same of their angular impulses (N m s).
+pub fn joint_angular_impulses(simulation: &Simulation) -> Vec<Vec3> {
+    let joints = simulation.world.joints.handles().iter();
+    joints.map(|&joint| simulation.joint_angular_impulse(joint).unwrap_or_default()).collect()
 }

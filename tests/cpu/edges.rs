@@ -496,22 +496,24 @@ fn a_wall_a_step_and_the_end_of_a_row_are_as_they_were() {
 }
 
 /// The normals of a ridge lie between those of its two faces. A ball on the ridge between a box and a mesh that slopes
-/// down from it presses along the line from the ridge to its center, on both.
+/// down from it presses along the line from the ridge to its center on both, and beside the ridge along the normal of
+/// the face that it lies on.
 #[test]
 fn a_ridge_between_a_box_and_a_mesh_keeps_its_normals() {
-    for degrees in [10.0_f32, 22.5, 35.0] {
+    let on_ridge = |degrees: f32| (Vec3::ZERO, Quat::from_rotation_z(-degrees.to_radians()) * Vec3::Y);
+    let slope = Vec3::new(1.0, 1.0, 0.0).normalize();
+    let on_slope = (0.015 * Vec3::new(slope.x, -slope.y, 0.0), slope);
+    for (foot, away) in [on_ridge(10.0), on_ridge(22.5), on_ridge(35.0), on_slope, (-0.015 * Vec3::X, Vec3::Y)] {
         let mut world = World { gravity: Vec3::ZERO, ..World::new() };
         world.insert(Body::fixed().shape(Shape::cuboid(1.0, 0.5, 1.0)).position(-1.0, -0.5, 0.0));
         let corners = [(0.0, -1.0), (0.0, 1.0), (2.0, 1.0), (2.0, -1.0)].map(|(x, z)| Vec3::new(x, -x, z));
         let slope = Shape::mesh(corners.into(), vec![[0, 1, 2], [0, 2, 3]]).expect("a mesh");
         world.insert(Body::fixed().shape(slope));
-        let (x, y) = degrees.to_radians().sin_cos();
-        let away = Vec3::new(x, y, 0.0);
-        let center = 0.199 * away;
+        let center = foot + 0.199 * away;
         world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(center.x, center.y, 0.0));
         let mut simulation = Simulation::new(world).expect("a simulation");
         simulation.step(DT).expect("a step");
         let normals: Vec<Vec3> = simulation.contacts().map(|contact| contact.normal).collect();
-        assert!(!normals.is_empty() && normals.iter().all(|n| n.distance(away) < 1e-3), "{degrees}: {normals:?}");
+        assert!(!normals.is_empty() && normals.iter().all(|n| n.distance(away) < 1e-3), "{away}: {normals:?}");
     }
 }
