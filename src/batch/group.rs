@@ -28,8 +28,7 @@ pub(super) struct Group {
     /// Whether the caller chose the backend: steps of any size run on it, and the worlds of the group are assembled and
     /// stored on all threads.
     is_chosen: bool,
-    /// One line if the chosen backend failed in this step, and if it failed in the last run.
-    fault: Option<String>,
+    /// One line if the chosen backend failed in the last run.
     pub last_fault: Option<String>,
     problem: StepProblem,
     plan: StepPlan,
@@ -77,7 +76,6 @@ impl Group {
         Self {
             backend,
             is_chosen: true,
-            fault: None,
             last_fault: None,
             problem: StepProblem::default(),
             plan: StepPlan::default(),
@@ -104,17 +102,16 @@ impl Group {
             if way.is_over.load(Ordering::Relaxed) || jobs.iter().all(|job| job.stage == Stage::Out) {
                 break;
             }
-            let change = |own: &T, step, world: &mut World| before(own, step, world);
             each(jobs, on_threads, |Job { own, member, stage, alike }| {
                 *alike = None;
                 if *stage == Stage::Out {
                     return;
                 }
-                *stage = match member.begin_step(way.dt, |world| change(own, step, world)) {
+                *stage = match member.begin_step(way.dt, |world| before(own, step, world)) {
                     Ok(true) => Stage::Assembled,
                     Ok(false) => Stage::Still,
                     Err(error) => {
-                        member.fail(error, step, way.dt, |step, world| change(own, step, world));
+                        member.fail(error, step, way.dt, |step, world| before(own, step, world));
                         Stage::Out
                     }
                 };
@@ -123,9 +120,10 @@ impl Group {
                     *alike = Alike::of(simulation.config(), simulation.problem());
                 }
             });
-            self.run_alike(jobs);
-            let fault = self.fault.take();
-            self.last_fault = fault.clone().or(self.last_fault.take());
+            let fault = self.run_alike(jobs);
+            if fault.is_some() {
+                self.last_fault.clone_from(&fault);
+            }
             each(jobs, on_threads, |Job { own, member, stage, .. }| {
                 let repeats = *stage == Stage::Assembled;
                 let ended = match stage {
@@ -135,7 +133,7 @@ impl Group {
                     Stage::Still => member.note_step(way.dt),
                 };
                 if let Err(error) = ended {
-                    member.fail(error, step, way.dt, |step, world| change(own, step, world));
+                    member.fail(error, step, way.dt, |step, world| before(own, step, world));
                     *stage = Stage::Out;
                 } else {
                     member.note_fault(fault.as_ref().filter(|_| repeats));
@@ -146,7 +144,8 @@ impl Group {
     }
 
     /// Runs equal kinds of steps together. Without a chosen backend, a step without a match remains, to be run alone.
-    fn run_alike<T>(&mut self, jobs: &mut [Job<T>]) {
+    /// Returns one line if the chosen backend failed: the steps that are left run alone, too.
+    fn run_alike<T>(&mut self, jobs: &mut [Job<T>]) -> Option<String> {
         for first in 0..jobs.len() {
             if jobs[first].stage != Stage::Assembled || (jobs[first].alike.is_none() && !self.is_chosen) {
                 continue;
@@ -168,22 +167,22 @@ impl Group {
             // If that failed, each world runs its own step, which is unchanged.
             match ran {
                 Ok(Ok(())) => own.into_iter().for_each(|k| jobs[k].stage = Stage::Ran),
-                Ok(Err(error)) if self.is_chosen => return self.replace_backend(&error),
-                Err(panic) if self.is_chosen => return self.replace_backend(&Error::Panicked(panic.text)),
+                Ok(Err(error)) if self.is_chosen => return Some(self.replace_backend(&error)),
+                Err(panic) if self.is_chosen => return Some(self.replace_backend(&Error::Panicked(panic.text))),
                 _ => {
                     debug_assert!(false, "steps of one kind do not run as one");
                     *self = Self::in_lanes();
                 }
             }
         }
+        None
     }
 
-    /// Continues on another backend after the chosen one failed.
-    fn replace_backend(&mut self, error: &Error) {
+    /// Continues on another backend after the chosen one failed, and returns one line about it.
+    fn replace_backend(&mut self, error: &Error) -> String {
         let successor = if error.is_lost() { self.backend.successor() } else { None };
-        let next = Self::on(successor.unwrap_or_else(|| Box::new(Cpu::new())));
-        let fault = format!("{error}; the worlds repeated the step, and continue on {}", next.backend.name());
-        *self = Self { fault: Some(fault), last_fault: self.last_fault.take(), ..next };
+        *self = Self::on(successor.unwrap_or_else(|| Box::new(Cpu::new())));
+        format!("{error}; the worlds repeated the step, and continue on {}", self.backend.name())
     }
 
     fn run_as_one(

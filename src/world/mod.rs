@@ -89,7 +89,7 @@ pub struct World {
     /// Gravity of individual worlds that stand [beside](World::beside) each other (m/s²). A world with `None`, or
     /// beyond the end of the list, has `gravity`.
     pub own_gravity: Vec<Option<Vec3>>,
-    /// The bodies. Joints and contacts refer to a body by its index, which stays the same until the body is removed.
+    /// The bodies, by handle or by index. A body keeps its index until it is removed.
     pub bodies: Bodies,
     /// The joints.
     pub joints: Joints,

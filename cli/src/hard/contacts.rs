@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::{Checks, DT, LEAST, Setup, cube, energy, floor, watch, weightless};
+use super::{Checks, DT, LEAST, Setup, cube, energy, floor, largest_speed, watch, weightless};
 use drystone::stats::largest;
 use drystone::{Body, MassProperties, Result, Shape, World, metrics};
 use drystone_scenes::Scene;
@@ -13,8 +13,7 @@ pub(super) fn overlaps(setup: &Setup, checks: &mut Checks) -> Result<()> {
         world.insert(cube(0.0, 0.0));
         world.insert(cube(0.0, 1.0 - share));
         let mut simulation = setup.simulation(world)?;
-        let speed =
-            largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).map_or(0.0, |(speed, _)| speed))?);
+        let speed = largest(LEAST, watch(&mut simulation, 300, largest_speed)?);
         let (percent, limit) = (100.0 * share, f64::from(setup.config.push_limit));
         checks.at_most(format!("{percent:.0} %: largest speed over the push limit"), speed / limit, 1.0);
         let depth = 1e3 * simulation.penetration().max;
@@ -52,10 +51,7 @@ pub(super) fn no_direction(setup: &Setup, checks: &mut Checks) -> Result<()> {
 pub(super) fn held(setup: &Setup, checks: &mut Checks) -> Result<()> {
     for depth in [0.05, 0.1] {
         let mut simulation = setup.sleeping(Scene::find_spec(&format!("press:depth={depth}"))?.world)?;
-        let fastest = largest(
-            LEAST,
-            watch(&mut simulation, 600, |world| metrics::fastest(world).map_or(0.0, |(speed, _)| speed))?,
-        );
+        let fastest = largest(LEAST, watch(&mut simulation, 600, largest_speed)?);
         checks.at_most(format!("{depth} m deep: largest speed [m/s]"), fastest, 0.5);
         let crate_ = simulation.world.bodies.iter().position(|body| body.name == "crate").expect("a crate");
         let substeps = simulation.substeps_of(crate_) / setup.config.substeps;
@@ -121,7 +117,7 @@ pub(super) fn no_inertia(setup: &Setup, checks: &mut Checks) -> Result<()> {
     world.insert(wall(Body::kinematic().velocity(-0.1 * Vec3::X, Vec3::ZERO)));
     let before = world.clone();
     let mut simulation = setup.simulation(world)?;
-    let speed = largest(LEAST, watch(&mut simulation, 300, |w| metrics::fastest(w).map_or(0.0, |(speed, _)| speed))?);
+    let speed = largest(LEAST, watch(&mut simulation, 300, largest_speed)?);
     let moved = still.iter().map(|&i| before.bodies[i].position.distance(simulation.world.bodies[i].position).into());
     checks.finite("", &simulation.world);
     checks.at_most("displacement of bodies at rest [mm]", 1e3 * largest(LEAST, moved), 1.0);

@@ -167,6 +167,11 @@ fn watch(simulation: &mut Simulation, steps: u32, measure: impl Fn(&World) -> f6
     (0..steps).map(|_| simulation.step(DT).map(|_| measure(&simulation.world))).collect()
 }
 
+/// Speed of the fastest dynamic body (m/s); 0 without one.
+fn largest_speed(world: &World) -> f64 {
+    metrics::fastest(world).map_or(0.0, |(speed, _)| speed)
+}
+
 const CASES: &[Case] = &[
     case("H1", "a cube under a cube of 10 to 1e6 times its mass", stacks::light_under_heavy),
     case("H2", "towers of 20 and 40 cubes, shifted by 1 cm to either side in turn, 10 s", stacks::towers),

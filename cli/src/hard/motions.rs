@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Quat, Vec3};
 
-use super::{Checks, DT, LEAST, Setup, energy, floor, off, watch, weightless};
+use super::{Checks, DT, LEAST, Setup, energy, floor, largest_speed, off, watch, weightless};
 use drystone::config::Friction;
 use drystone::stats::largest;
-use drystone::{Body, Joint, MassProperties, Result, Shape, Simulation, World, metrics};
+use drystone::{Body, Joint, MassProperties, Result, Shape, Simulation, World};
 use drystone_scenes::Scene;
 
 pub(super) fn heavy_chain(setup: &Setup, checks: &mut Checks) -> Result<()> {
@@ -191,7 +191,7 @@ pub(super) fn release(setup: &Setup, checks: &mut Checks) -> Result<()> {
 /// Twenty ragdolls fall on the floor, and nothing drives them.
 pub(super) fn ragdolls(setup: &Setup, checks: &mut Checks) -> Result<()> {
     let mut simulation = setup.sleeping(Scene::find("ragdolls", &[])?.world)?;
-    let speeds = watch(&mut simulation, 300, |world| metrics::fastest(world).map_or(0.0, |(speed, _)| speed))?;
+    let speeds = watch(&mut simulation, 300, largest_speed)?;
     checks.at_most("speed in the fifth second [m/s]", largest(LEAST, speeds[240..].iter().copied()), 0.05);
     let asleep = simulation.world.bodies.handles().filter(|&body| simulation.is_asleep(body)).count();
     checks.at_most("parts awake after 5 s", (simulation.world.dynamic_count() - asleep) as f64, 0.0);
