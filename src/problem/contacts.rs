@@ -40,9 +40,9 @@ pub struct ContactRows {
     jams: Vec<bool>,
     /// Whether the points of each slot's contact are struck together in this step; empty if none are.
     struck: Vec<bool>,
-    /// Whether any part of each body may be faster than half the threshold of restitution, and whether a joint holds
-    /// it.
+    /// Whether any part of each body may be faster than half the threshold of restitution.
     fast: Vec<bool>,
+    /// Whether a joint holds each dynamic body; empty without joints.
     jointed: Vec<bool>,
     /// The classes of bodies when the rows were written.
     classes: Vec<u8>,
@@ -339,16 +339,33 @@ impl ContactRows {
         })
     }
 
-    /// Whether any contact that takes part jams.
-    pub fn any_jamming(&self) -> bool {
-        let jams = self.jams();
+    /// Whether any of the contacts `rows` that takes part jams.
+    pub fn any_jamming(&self, rows: &[ContactRow]) -> bool {
+        let jams = self.jams(rows);
         self.slots.taking_part().any(jams)
     }
 
-    /// A test of whether the contact in a row jams.
-    pub fn jams(&self) -> impl Fn(u32) -> bool + '_ {
+    /// A test of whether the contact in a row jams, by its masses. A contact of a body with joints does not.
+    pub fn jams<'a>(&'a self, rows: &'a [ContactRow]) -> impl Fn(u32) -> bool + 'a {
         let may_jam = self.materials.unwrap_or_default().and(&self.hooked).may_jam;
-        move |row| may_jam && self.jams[row as usize]
+        move |row| may_jam && self.jams[row as usize] && !self.is_jointed(&rows[row as usize])
+    }
+
+    /// Whether a joint holds a dynamic body of a contact. A joint passes impulses on, so the masses of the two bodies do
+    /// not tell the effect of an impulse. Such a contact is swept once, and its points are not struck together.
+    fn is_jointed(&self, contact: &ContactRow) -> bool {
+        let is_held = |body: u32| self.jointed.get(body as usize).is_some_and(|&is_held| is_held);
+        is_held(contact.body_a) || is_held(contact.body_b)
+    }
+
+    fn note_jointed(&mut self, world: &World) {
+        self.jointed.clear();
+        for (a, b) in world.joints.iter().filter(|joint| !joint.holds_nothing()).map(Joint::indices) {
+            self.jointed.resize(world.bodies.len(), false);
+            for body in [Some(a), b].into_iter().flatten() {
+                self.jointed[body] = world.bodies[body].kind == BodyKind::Dynamic;
+            }
+        }
     }
 
     /// Whether the points of any contact are struck together.
@@ -362,10 +379,9 @@ impl ContactRows {
     }
 
     /// Marks as struck the contacts of several points whose surfaces meet, on average, faster than the threshold of
-    /// restitution. A contact of a body with joints is never struck: a joint passes a blow on, so the masses of the two
-    /// bodies do not tell its effect. Such contacts are swept like others.
+    /// restitution.
     fn note_struck(&mut self, world: &World, threshold: f32, problem: &StepProblem) {
-        let Self { slots, struck, fast, jointed, .. } = self;
+        let mut struck = std::mem::take(&mut self.struck);
         let is_fast = |(row, body): (&BodyRow, &Body)| {
             let [v, w] = [row.v, row.w].map(Vec3::from);
             // No point of a solid is much farther out than three radii of gyration. A driven body may have no mass.
@@ -376,20 +392,12 @@ impl ContactRows {
                 || body.kind == BodyKind::Kinematic && body.is_driven()
         };
         struck.clear();
-        fast.clear();
-        fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
-        if !fast.contains(&true) {
-            return;
-        }
-        jointed.clear();
-        jointed.resize(fast.len(), false);
-        for (a, b) in world.joints.iter().filter(|joint| !joint.holds_nothing()).map(Joint::indices) {
-            [Some(a), b].into_iter().flatten().for_each(|body| jointed[body] = true);
-        }
+        self.fast.clear();
+        self.fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
         let is_struck = |(slot, contact): (&Slot, &ContactRow)| {
             let bodies = [contact.body_a as usize, contact.body_b as usize];
-            let is_free = || bodies.iter().all(|&body| !jointed[body]);
-            if !slot.takes_part || contact.point_count < 2 || !bodies.iter().any(|&body| fast[body]) || !is_free() {
+            let is_fast = || bodies.iter().any(|&body| self.fast[body]);
+            if !slot.takes_part || contact.point_count < 2 || !is_fast() || self.is_jointed(contact) {
                 return false;
             }
             let first = contact.first_point as usize;
@@ -402,10 +410,13 @@ impl ContactRows {
             });
             (b - a).dot(contact.normal.into()) < -threshold * count
         };
-        struck.extend(slots.all.iter().zip(&problem.contacts).map(is_struck));
+        if self.fast.contains(&true) {
+            struck.extend(self.slots.all.iter().zip(&problem.contacts).map(is_struck));
+        }
         if !struck.contains(&true) {
             struck.clear();
         }
+        self.struck = struck;
     }
 
     /// Marks the bodies that lie still and have only new contacts, and returns whether there are any.
@@ -499,6 +510,7 @@ impl ContactRows {
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
+        self.note_jointed(world);
         self.note_struck(world, config.restitution_threshold, problem);
     }
 

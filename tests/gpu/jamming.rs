@@ -3,14 +3,17 @@
 use crate::common::Open;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::plan::Kernel;
-use drystone::{Backend, Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, Body, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
 
 tests! {
     every_backend {
         a_rod_that_is_pushed_on_its_tip_gains_no_energy,
+        a_cart_that_slides_sideways_is_braked_by_mu_g,
     }
     no_gpu {
         a_rod_gains_no_energy_with_any_number_of_substeps,
+        a_rod_on_a_hinge_that_is_pushed_on_its_tip_gains_no_energy,
+        a_cart_is_braked_by_mu_g_with_any_number_of_substeps,
         a_plane_is_touched_without_a_margin,
         a_tip_that_swings_onto_a_plane_does_not_sink_in,
         contacts_that_do_not_jam_are_swept_once,
@@ -64,6 +67,65 @@ fn a_rod_gains_no_energy_with_any_number_of_substeps() {
             let what = format!("mu {mu}, {degrees} degrees, way {way}, {substeps} substeps");
             measured!("{what}: {most:.1e}");
             assert!(most < 3e-4 && left < 0.5, "{what}: {most} in a step, {left} left");
+        }
+    }
+}
+
+/// The deceleration, relative to mu g, of a cart on four wheels that slides sideways at 5 m/s. Its wheels are on hinges.
+/// Each wheel alone would jam with mu 2, the cart does not.
+fn braking(mu: f32, substeps: u32, backend: Box<dyn Backend>) -> f64 {
+    let mut world = World::new();
+    let sideways = 5.0 * Vec3::Z;
+    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(mu));
+    let chassis = Body::dynamic().shape(Shape::cuboid(1.5, 0.1, 1.5)).position(0.0, 0.4, 0.0);
+    let chassis = world.insert(chassis.velocity(sideways, Vec3::ZERO));
+    for (x, z) in [(-1.5, -1.7), (-1.5, 1.7), (1.5, -1.7), (1.5, 1.7)] {
+        let turn = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
+        let wheel = Body::dynamic().shape_at(Shape::cylinder(0.1, 0.4), Vec3::ZERO, turn).friction(mu);
+        let wheel = world.insert(wheel.position(x, 0.4, z).velocity(sideways, Vec3::ZERO));
+        world.insert_joint(Joint::new(wheel, Vec3::ZERO, chassis, Vec3::new(x, 0.0, z)).hinge(Vec3::Z));
+    }
+    let mut simulation = simulate(world, substeps, backend);
+    let steps = 8;
+    (0..steps).for_each(|_| drop(simulation.step(DT).expect("a step")));
+    let [mass, momentum] = simulation.world.bodies.iter().fold([0.0_f64; 2], |[mass, momentum], body| {
+        let own = f64::from(body.mass.mass);
+        [mass + own, momentum + own * f64::from(body.linear_velocity.z)]
+    });
+    (5.0 - momentum / mass) / (f64::from(mu) * 9.81 * f64::from(DT) * f64::from(steps))
+}
+
+fn a_cart_that_slides_sideways_is_braked_by_mu_g(open: Open) {
+    let share = braking(2.0, 8, open());
+    assert!((share - 1.0).abs() < 0.03, "{share} of mu g");
+}
+
+/// Before: 0.6 of mu g with mu 2 and 8 substeps. Its wheels were swept eight times each, as if nothing held them.
+fn a_cart_is_braked_by_mu_g_with_any_number_of_substeps() {
+    for mu in [0.3, 0.8, 1.2, 2.0] {
+        for substeps in [4, 8, 16, 32] {
+            let share = braking(mu, substeps, Box::new(Cpu::new()));
+            measured!("mu {mu}, {substeps} substeps: {share:.3}");
+            assert!((share - 1.0).abs() < 0.03, "mu {mu}, {substeps} substeps: {share} of mu g");
+        }
+    }
+}
+
+/// A chalk on a board: a hinge moves at 3 m/s along the floor, and pulls or pushes a rod whose tip rubs on the floor.
+fn a_rod_on_a_hinge_that_is_pushed_on_its_tip_gains_no_energy() {
+    for (mu, degrees) in [(1.5, 60.0), (2.0, 60.0), (3.0, 45.0), (5.0, 50.0)] {
+        for (way, substeps) in [-1.0, 1.0].into_iter().flat_map(|way| [4, 8, 16, 32].map(|n| (way, n))) {
+            let mut world = rod(mu, degrees, way);
+            let degrees = degrees.to_radians();
+            let top = Vec3::new(degrees.cos(), 2.0 * degrees.sin() + 0.01, 0.0);
+            let carriage = Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).locked_translations([false, true, true]);
+            let carriage = carriage.locked_rotations([true; 3]).position(top.x, top.y, 0.0);
+            let carriage = world.insert(carriage.velocity(5.0 * way * Vec3::X, Vec3::ZERO));
+            world.insert_joint(Joint::new(1, Vec3::Y, carriage, Vec3::ZERO).hinge(Vec3::Z));
+            let [most, left] = gained(world, substeps, Box::new(Cpu::new()));
+            let what = format!("mu {mu}, way {way}, {substeps} substeps");
+            measured!("{what}: {most:.1e}, {left:.2} left");
+            assert!(most < 1e-3, "{what}: {most} in a step, {left} left");
         }
     }
 }
