@@ -6,11 +6,12 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::StepProblem;
+use super::blows::Blows;
 use super::bodies::MIN_BODIES;
 use super::carry::{Carry, NO_POINT, Preload, Written};
 use super::points_a_slot;
 use super::prepare::{ComputedRow, PoseRow};
-use super::rows::{BodyRow, ContactRow, ImpulseRow, PointRow, Substep};
+use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
 use super::slots::{Slot, Slots, Write};
 use super::write::{SlotRows, Writer, point_before};
 use crate::collide::{Detector, MAX_POINTS, Manifold};
@@ -20,7 +21,7 @@ use crate::effort::{self, Effort, Interface};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, IMMOVABLE};
 use crate::stats::HardestContact;
-use crate::world::{Body, BodyKind, Joint, Material, World};
+use crate::world::{Body, Material, World};
 
 /// The manifolds that have rows, and their colors. Only the rows hold impulses and preloads.
 #[derive(Debug, Default)]
@@ -38,12 +39,8 @@ pub struct ContactRows {
     /// Whether the manifold of each slot jams, with
     /// [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1 at some point.
     jams: Vec<bool>,
-    /// Whether the points of each slot's contact are struck together in this step; empty if none are.
-    struck: Vec<bool>,
-    /// Whether any part of each body may be faster than half the threshold of restitution.
-    fast: Vec<bool>,
-    /// Whether a joint holds each dynamic body; empty without joints.
-    jointed: Vec<bool>,
+    /// The contacts that are struck in this step, and those of bodies with joints.
+    blows: Blows,
     /// The classes of bodies when the rows were written.
     classes: Vec<u8>,
     /// The common facts about all materials; `None` if a material may have changed.
@@ -69,7 +66,7 @@ crate::saved::cloned!(ContactRows {
     hooked,
     sums,
     carry,
-} scratch { graph, poses, struck, fast, jointed, new_bodies });
+} scratch { graph, poses, blows, new_bodies });
 
 /// The rows that contacts have besides those of their points, and whether rows have slips.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -348,75 +345,12 @@ impl ContactRows {
     /// A test of whether the contact in a row jams, by its masses. A contact of a body with joints does not.
     pub fn jams<'a>(&'a self, rows: &'a [ContactRow]) -> impl Fn(u32) -> bool + 'a {
         let may_jam = self.materials.unwrap_or_default().and(&self.hooked).may_jam;
-        move |row| may_jam && self.jams[row as usize] && !self.is_jointed(&rows[row as usize])
+        move |row| may_jam && self.jams[row as usize] && !self.blows.is_jointed(&rows[row as usize])
     }
 
-    /// Whether a joint holds a dynamic body of a contact. A joint passes impulses on, so the masses of the two bodies do
-    /// not tell the effect of an impulse. Such a contact is swept once, and its points are not struck together.
-    fn is_jointed(&self, contact: &ContactRow) -> bool {
-        let is_held = |body: u32| self.jointed.get(body as usize).is_some_and(|&is_held| is_held);
-        is_held(contact.body_a) || is_held(contact.body_b)
-    }
-
-    fn note_jointed(&mut self, world: &World) {
-        self.jointed.clear();
-        for (a, b) in world.joints.iter().filter(|joint| !joint.holds_nothing()).map(Joint::indices) {
-            self.jointed.resize(world.bodies.len(), false);
-            for body in [Some(a), b].into_iter().flatten() {
-                self.jointed[body] = world.bodies[body].kind == BodyKind::Dynamic;
-            }
-        }
-    }
-
-    /// Whether the points of any contact are struck together.
-    pub fn any_struck(&self) -> bool {
-        !self.struck.is_empty()
-    }
-
-    /// Whether the points of the contact in a row are struck together.
-    pub fn is_struck(&self, row: u32) -> bool {
-        self.any_struck() && self.struck[row as usize]
-    }
-
-    /// Marks as struck the contacts of several points whose surfaces meet, on average, faster than the threshold of
-    /// restitution.
-    fn note_struck(&mut self, world: &World, threshold: f32, problem: &StepProblem) {
-        let mut struck = std::mem::take(&mut self.struck);
-        let is_fast = |(row, body): (&BodyRow, &Body)| {
-            let [v, w] = [row.v, row.w].map(Vec3::from);
-            // No point of a solid is much farther out than three radii of gyration. A driven body may have no mass.
-            let reach = || 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
-            let is_above = |half_square: f32| 8.0 * half_square > threshold * threshold;
-            is_above(v.length_squared())
-                || w != Vec3::ZERO && is_above(v.length_squared() + reach() * w.length_squared())
-                || body.kind == BodyKind::Kinematic && body.is_driven()
-        };
-        struck.clear();
-        self.fast.clear();
-        self.fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
-        let is_struck = |(slot, contact): (&Slot, &ContactRow)| {
-            let bodies = [contact.body_a as usize, contact.body_b as usize];
-            let is_fast = || bodies.iter().any(|&body| self.fast[body]);
-            if !slot.takes_part || contact.point_count < 2 || !is_fast() || self.is_jointed(contact) {
-                return false;
-            }
-            let first = contact.first_point as usize;
-            let points = &problem.points[first..first + contact.point_count as usize];
-            let arms = points.iter().fold([Vec3::ZERO; 2], |[a, b], p| [a + Vec3::from(p.r_a), b + Vec3::from(p.r_b)]);
-            let count = points.len() as f32;
-            let [a, b] = [0, 1].map(|side| {
-                let BodyRow { v, w, .. } = problem.bodies[bodies[side]];
-                count * Vec3::from(v) + Vec3::from(w).cross(arms[side])
-            });
-            (b - a).dot(contact.normal.into()) < -threshold * count
-        };
-        if self.fast.contains(&true) {
-            struck.extend(self.slots.all.iter().zip(&problem.contacts).map(is_struck));
-        }
-        if !struck.contains(&true) {
-            struck.clear();
-        }
-        self.struck = struck;
+    /// The contacts that are struck in this step.
+    pub fn blows(&self) -> &Blows {
+        &self.blows
     }
 
     /// Marks the bodies that lie still and have only new contacts, and returns whether there are any.
@@ -510,8 +444,7 @@ impl ContactRows {
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
-        self.note_jointed(world);
-        self.note_struck(world, config.restitution_threshold, problem);
+        self.blows.note(&self.slots.all, world, config.restitution_threshold, problem);
     }
 
     /// Makes room for the rows of all slots. If friction moves between points and manifolds, friction begins without

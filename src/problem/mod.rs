@@ -3,6 +3,7 @@
 pub(crate) mod arithmetic;
 mod axes;
 mod blocks;
+mod blows;
 mod bodies;
 pub mod carry;
 mod check;

@@ -1,0 +1,132 @@
+//! Blows: the contacts whose points are swept together, because the surfaces meet at speed or pass a blow on.
+
+use glam::Vec3;
+
+use super::StepProblem;
+use super::rows::{BodyRow, ContactRow};
+use super::slots::Slot;
+use crate::graph::Islands;
+use crate::world::{Body, BodyKind, Joint, World};
+
+/// The contacts that are struck in a step.
+#[derive(Debug, Default)]
+pub struct Blows {
+    /// Whether the points of each slot's contact are struck together; empty if none are.
+    struck: Vec<bool>,
+    /// Whether a joint holds each dynamic body; empty without joints.
+    jointed: Vec<bool>,
+    /// Whether any part of each body may be faster than half the threshold of restitution.
+    fast: Vec<bool>,
+    /// The islands of fast dynamic bodies that touch and move together.
+    islands: Islands,
+    /// Whether a struck contact belongs to the island with each root.
+    hit: Vec<bool>,
+}
+
+impl Blows {
+    /// Whether the points of any contact are struck together.
+    pub fn any(&self) -> bool {
+        !self.struck.is_empty()
+    }
+
+    /// Whether the points of the contact in a row are struck together.
+    pub fn is_struck(&self, row: u32) -> bool {
+        self.any() && self.struck[row as usize]
+    }
+
+    /// Whether a joint holds a dynamic body of a contact. A joint passes impulses on, so the masses of the two bodies do
+    /// not tell the effect of an impulse. Such a contact is swept once, and its points are not struck together.
+    pub fn is_jointed(&self, contact: &ContactRow) -> bool {
+        holds(&self.jointed, contact)
+    }
+
+    /// Marks as struck the contacts of several points whose surfaces meet, on average, faster than `threshold` (m/s),
+    /// and those that pass such a blow on.
+    pub(super) fn note(&mut self, slots: &[Slot], world: &World, threshold: f32, problem: &StepProblem) {
+        self.note_joints(world);
+        let is_fast = |(row, body): (&BodyRow, &Body)| {
+            let [v, w] = [row.v, row.w].map(Vec3::from);
+            // No point of a solid is much farther out than three radii of gyration. A driven body may have no mass.
+            let reach = || 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
+            let is_above = |half_square: f32| 8.0 * half_square > threshold * threshold;
+            is_above(v.length_squared())
+                || w != Vec3::ZERO && is_above(v.length_squared() + reach() * w.length_squared())
+                || body.kind == BodyKind::Kinematic && body.is_driven()
+        };
+        self.struck.clear();
+        self.fast.clear();
+        self.fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
+        if !self.fast.contains(&true) {
+            return;
+        }
+        let mut struck = std::mem::take(&mut self.struck);
+        let meets = |(slot, contact): (&Slot, &ContactRow)| {
+            let is_fast = || [contact.body_a, contact.body_b].iter().any(|&body| self.fast[body as usize]);
+            let can_meet = slot.takes_part && contact.point_count > 1 && is_fast() && !self.is_jointed(contact);
+            can_meet && relative_velocity(problem, contact).dot(contact.normal.into()) < -threshold
+        };
+        struck.extend(slots.iter().zip(&problem.contacts).map(meets));
+        if struck.contains(&true) {
+            self.pass_on(&mut struck, slots, world, threshold, problem);
+        } else {
+            struck.clear();
+        }
+        self.struck = struck;
+    }
+
+    fn note_joints(&mut self, world: &World) {
+        self.jointed.clear();
+        for (a, b) in world.joints.iter().filter(|joint| !joint.holds_nothing()).map(Joint::indices) {
+            self.jointed.resize(world.bodies.len(), false);
+            for body in [Some(a), b].into_iter().flatten() {
+                self.jointed[body] = world.bodies[body].kind == BodyKind::Dynamic;
+            }
+        }
+    }
+
+    /// Marks the contacts of bodies that move fast and together, and to one of which a struck contact belongs. In a
+    /// column that falls flat, only the lowest contact meets at speed. Swept point by point, the others would topple it.
+    fn pass_on(&mut self, struck: &mut [bool], slots: &[Slot], world: &World, threshold: f32, problem: &StepProblem) {
+        let contacts = &problem.contacts;
+        let Self { jointed, fast, islands, hit, .. } = self;
+        let is_mover = |body: u32| fast[body as usize] && world.bodies[body as usize].kind == BodyKind::Dynamic;
+        let passes = |(slot, contact): (&Slot, &ContactRow)| {
+            let are_movers = slot.takes_part && is_mover(contact.body_a) && is_mover(contact.body_b);
+            are_movers && relative_velocity(problem, contact).length() < 0.5 * threshold
+        };
+        islands.reset(fast.len());
+        for (_, contact) in slots.iter().zip(contacts).filter(|&contact| passes(contact)) {
+            islands.join(contact.body_a, contact.body_b);
+        }
+        let roots = islands.roots();
+        hit.clear();
+        hit.resize(fast.len(), false);
+        for (contact, _) in contacts.iter().zip(&*struck).filter(|&(_, &is_struck)| is_struck) {
+            for body in [contact.body_a, contact.body_b].into_iter().filter(|&body| is_mover(body)) {
+                hit[roots[body as usize] as usize] = true;
+            }
+        }
+        for ((slot, contact), is_struck) in slots.iter().zip(contacts).zip(struck) {
+            let is_hit = || hit[roots[contact.body_a as usize] as usize];
+            *is_struck |= contact.point_count > 2 && passes((slot, contact)) && is_hit() && !holds(jointed, contact);
+        }
+    }
+}
+
+/// Whether a joint holds a body of a contact.
+fn holds(jointed: &[bool], contact: &ContactRow) -> bool {
+    [contact.body_a, contact.body_b].iter().any(|&body| jointed.get(body as usize).is_some_and(|&is_held| is_held))
+}
+
+/// The mean velocity of the surface of body b of a contact against that of body a (m/s).
+fn relative_velocity(problem: &StepProblem, contact: &ContactRow) -> Vec3 {
+    let first = contact.first_point as usize;
+    let points = &problem.points[first..first + contact.point_count as usize];
+    let arms = points.iter().fold([Vec3::ZERO; 2], |[a, b], p| [a + Vec3::from(p.r_a), b + Vec3::from(p.r_b)]);
+    let count = points.len() as f32;
+    let [a, b] = [(contact.body_a, arms[0]), (contact.body_b, arms[1])].map(|(body, arms)| {
+        let BodyRow { v, w, .. } = problem.bodies[body as usize];
+        count * Vec3::from(v) + Vec3::from(w).cross(arms)
+    });
+    (b - a) / count
+}
