@@ -287,7 +287,7 @@ fn of_plan(
             }
         }
         calls.push(match kernel {
-            // They find their rows themselves.
+            // These kernels find their rows themselves.
             Kernel::Extrapolate { .. } | Kernel::MeasureStep | Kernel::UpdateMomentum => format!("{call};"),
             Kernel::BeginSweep { .. } => over_count("1u", &call),
             _ => {
