@@ -26,6 +26,7 @@ pub(crate) type ColliderSide = (u32, u32);
 pub(crate) type PairFilter<'a> = dyn FnMut([ColliderSide; 2]) -> bool + 'a;
 
 /// Finds the contacts of one world or of several worlds beside each other, and keeps them from step to step.
+#[derive(Default)]
 pub struct Detector {
     pub(super) worlds: Vec<WorldContacts>,
     /// The known bodies, by index.
@@ -157,19 +158,7 @@ impl Detector {
 
     /// A detector for the present bodies of `world`.
     pub fn new(world: &World) -> Self {
-        let mut detector = Self {
-            worlds: Vec::new(),
-            known: Vec::new(),
-            kinds: Vec::new(),
-            groups: Vec::new(),
-            moving: Vec::new(),
-            extents: Vec::new(),
-            left: Vec::new(),
-            falls: Vec::new(),
-            jointed: jointed(world),
-            overlaps: Vec::new(),
-            refused: HashSet::new(),
-        };
+        let mut detector = Self { jointed: jointed(world), ..Self::default() };
         detector.follow_bodies(world, &(0..world.bodies.len()).collect::<Vec<_>>());
         detector
     }

@@ -70,8 +70,9 @@ impl Track {
 /// Pairs, in the order of discovery.
 #[derive(Default)]
 pub(super) struct Pairs {
-    all: Vec<Pair>,
-    tracks: Vec<Track>,
+    pub all: Vec<Pair>,
+    /// The test data of each.
+    pub tracks: Vec<Track>,
 }
 
 crate::saved::cloned!(Pairs { all, tracks });
@@ -101,31 +102,6 @@ impl Pairs {
         self.tracks.par_extend(new.map(|pair| Track::of(pair, colliders)));
     }
 
-    /// Pairs with their test data.
-    pub fn of((all, tracks): (Vec<Pair>, Vec<Track>)) -> Self {
-        Self { all, tracks }
-    }
-
-    /// A pair and its test data.
-    pub fn with_track(&self, place: usize) -> (&Pair, &Track) {
-        (&self.all[place], &self.tracks[place])
-    }
-
-    /// The same, to change both.
-    pub fn with_track_mut(&mut self, place: usize) -> (&mut Pair, &mut Track) {
-        (&mut self.all[place], &mut self.tracks[place])
-    }
-
-    /// The test data of all pairs.
-    pub fn tracks(&self) -> &[Track] {
-        &self.tracks
-    }
-
-    /// The same, to change it.
-    pub fn tracks_mut(&mut self) -> &mut [Track] {
-        &mut self.tracks
-    }
-
     /// Ends a pair. The last pair takes its index.
     pub fn swap_remove(&mut self, place: usize) -> Pair {
         self.tracks.swap_remove(place);
@@ -136,11 +112,6 @@ impl Pairs {
     pub fn end(&mut self, place: usize) {
         self.all[place].end();
         self.tracks[place].predicted = NEVER;
-    }
-
-    /// Radius around the origin of body b of a pair that contains its collider (m).
-    pub fn reach_b(&self, place: usize) -> f32 {
-        self.tracks[place].reach_b
     }
 
     /// The poses of the bodies of a pair when its manifolds were computed. Returns `None` if they never were, or if a

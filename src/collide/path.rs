@@ -156,30 +156,19 @@ impl Narrow<'_> {
                 return false;
             }
             let own = Swept::new(c, body, &ways[side]);
-            let mut is_earlier = false;
-            let meet = |other: u32| {
+            let meets = |other: u32| {
                 let standing = &self.colliders[other as usize];
-                let others = [pair.collider_a, pair.collider_b].contains(&other) || standing.body == c.body;
-                if is_earlier || others || !self.neighbors.may_hold(c.body, standing.body) {
-                    return;
+                let is_own = [pair.collider_a, pair.collider_b].contains(&other) || standing.body == c.body;
+                if is_own || !self.neighbors.may_hold(c.body, standing.body) {
+                    return false;
                 }
                 let way = BodyPath::free(&self.moving[standing.body as usize], 0.0);
                 let standing = Swept::new(standing, &self.moving[standing.body as usize], &way);
-                let met = impact(standing, own, c.size, Until::Deep, true);
-                is_earlier = met.is_some_and(|met| met.time < time);
+                impact(standing, own, c.size, Until::Deep, true).is_some_and(|met| met.time < time)
             };
-            self.neighbors.tree.visit(&own.aabb(), meet);
+            let mut is_earlier = self.neighbors.planes.iter().any(|plane| meets(plane.collider));
+            self.neighbors.tree.visit(&own.aabb(), |other| is_earlier = is_earlier || meets(other));
             is_earlier
-                || self.neighbors.planes.iter().any(|plane| {
-                    let standing = &self.colliders[plane.collider as usize];
-                    let way = BodyPath::free(&self.moving[standing.body as usize], 0.0);
-                    let others = [pair.collider_a, pair.collider_b].contains(&plane.collider);
-                    let standing = Swept::new(standing, &self.moving[standing.body as usize], &way);
-                    let met = || impact(standing, own, c.size, Until::Deep, true);
-                    !others
-                        && self.neighbors.may_hold(c.body, self.colliders[plane.collider as usize].body)
-                        && met().is_some_and(|met| met.time < time)
-                })
         };
         is_earlier(0) || is_earlier(1)
     }

@@ -140,7 +140,7 @@ impl<M: PolygonalFeatureMap + ?Sized> PolygonalFeatureMap for Magnified<'_, M> {
 }
 
 /// The center of a ball.
-struct Point;
+pub(super) struct Point;
 
 impl SupportMap for Point {
     fn local_support_point(&self, _: Vec3) -> Vec3 {

@@ -11,10 +11,10 @@ use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Pose;
 use parry3d::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_points};
 use parry3d::query::intersection_test;
-use parry3d::shape::{Ball, PolygonalFeatureMap, Shape, SupportMap, Triangle};
+use parry3d::shape::{Ball, PolygonalFeatureMap, Shape, Triangle};
 
 use super::collider::{BodyState, ColliderInfo};
-use super::solid::{Magnified, Solid, magnification};
+use super::solid::{Magnified, Point, Solid, magnification};
 use crate::math::rotation::{about, product, unit, vector_of};
 use crate::world::placed;
 
@@ -413,9 +413,7 @@ impl Search<'_> {
         }
         let by = magnification(self.size);
         let pos12 = Pose::from_parts(by * between, product(back, b.arm.rotation));
-        let point = Point;
-        let [a_core, b_core] = [a, b].map(|side| side.core.map_or(&point as &dyn SupportMap, as_support_map));
-        let [map_a, map_b] = [a_core, b_core].map(|map| Magnified { map, by });
+        let [map_a, map_b] = [a, b].map(|side| Magnified { map: side.core.unwrap_or(&Point), by });
         let mut simplex = VoronoiSimplex::new();
         simplex.reset(CsoPoint::from_shapes(&pos12, &map_a, &map_b, (-between).normalize_or(Vec3::X)));
         match closest_points(&pos12, &map_a, &map_b, f32::MAX, true, &mut simplex) {
@@ -426,19 +424,6 @@ impl Search<'_> {
             }
             _ => None,
         }
-    }
-}
-
-fn as_support_map(core: &dyn PolygonalFeatureMap) -> &dyn SupportMap {
-    core
-}
-
-/// The center of a ball.
-struct Point;
-
-impl SupportMap for Point {
-    fn local_support_point(&self, _: Vec3) -> Vec3 {
-        Vec3::ZERO
     }
 }
 

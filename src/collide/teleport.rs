@@ -87,6 +87,6 @@ impl<'a> Teleports<'a> {
         let (turn_a, turn_b) = (turned(a), turned(b));
         let shift = apart(&self.now) - turn_a * apart(self.left);
         let turn = product(turn_a.inverse(), turn_b);
-        shift.length() + 2.0 * turn.xyz().length() * pairs.reach_b(place) > size
+        shift.length() + 2.0 * turn.xyz().length() * pairs.tracks[place].reach_b > size
     }
 }

@@ -228,9 +228,9 @@ impl WorldContacts {
 
     /// Drops points of the manifolds of a pair. The next detection computes the pair again.
     pub fn drop_points(&mut self, place: u32, kept: &[[bool; MAX_POINTS]], is_reused: bool) -> &Pair {
-        let (pair, track) = self.pairs.with_track_mut(place as usize);
+        let pair = &mut self.pairs.all[place as usize];
         pair.drop_points(kept, is_reused);
-        track.predicted = ANEW;
+        self.pairs.tracks[place as usize].predicted = ANEW;
         self.changed.push(PairChange { pair: place, computed: true });
         pair
     }

@@ -4,7 +4,7 @@ use super::Rules;
 use super::pair::{has_locks, inverse_masses, keep_locks, note_correction, relative_movement};
 use super::rows::{Axis, Joint, Pair, StepParams};
 use crate::constants::MIN_MOVED;
-use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, smaller, turned, vec3};
+use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, select3, smaller, turned, vec3};
 
 /// Motion of the bodies along an axis. Twin of the WGSL struct `AxisMotion`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -17,13 +17,6 @@ pub struct AxisMotion<L> {
     pub about_b: Vec3<L>,
     /// Movement of a against b since the step began.
     pub moved: L,
-}
-
-/// Selects each component.
-#[inline(always)]
-pub(super) fn select3<L: Lane>(if_false: Vec3<L>, if_true: Vec3<L>, mask: L::Mask) -> Vec3<L> {
-    let select = L::select;
-    vec3(select(if_false.x, if_true.x, mask), select(if_false.y, if_true.y, mask), select(if_false.z, if_true.z, mask))
 }
 
 /// The rotation vector of a against b since the step began, to 3e-4 at 1 rad.

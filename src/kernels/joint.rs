@@ -2,11 +2,10 @@
 //! and of the kernels `warm_start_joints` and `solve_joints`.
 
 use super::Rules;
-use super::axis::select3;
 use super::pair::{apply_impulse, inverse_masses, note_correction, relative_movement, relative_velocity};
 use super::rows::{Joint, Mass, Pair, StepParams};
 use crate::constants::STIFFENING;
-use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, turned, vec3};
+use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, select3, turned, vec3};
 
 /// The present arms. They turned with their bodies since the step began.
 #[inline(always)]

@@ -10,12 +10,12 @@
 //! (`JointSystems`).
 
 use super::Rules;
-use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock, select3};
+use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock};
 use super::joint::current_anchors;
 use super::pair::{relative_movement, relative_velocity};
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
 use crate::constants::MIN_PIVOT;
-use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, turned, vec3};
+use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, select3, turned, vec3};
 use crate::problem::arithmetic::unlocked;
 use crate::problem::{JointSystems, NodeRow};
 

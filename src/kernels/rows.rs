@@ -290,24 +290,17 @@ impl<S: Scalar> Mass<S> {
     }
 }
 
-/// `load` of numbers that are the same in every lane.
-macro_rules! constants {
-    ($($Kernel:ident as $Row:ident { [$($number:ident),*] $($softness:ident),* })*) => {$(
-        impl<L: Lane> $Kernel<L> {
-            /// Loads the numbers from storage, the same in every lane.
-            #[inline(always)]
-            pub fn load(r: &$Row) -> Self {
-                Self {
-                    $($number: L::constant(r.$number.into()),)*
-                    $($softness: SoftnessOf::load(&r.$softness),)*
-                }
-            }
+impl<L: Lane> SoftnessOf<L> {
+    /// Loads the numbers from storage, the same in every lane.
+    #[inline(always)]
+    pub fn load(r: &Softness) -> Self {
+        Self {
+            bias_rate: L::constant(r.bias_rate.into()),
+            mass_scale: L::constant(r.mass_scale.into()),
+            impulse_scale: L::constant(r.impulse_scale.into()),
+            push_limit: L::constant(r.push_limit.into()),
         }
-    )*};
-}
-
-constants! {
-    SoftnessOf as Softness { [bias_rate, mass_scale, impulse_scale, push_limit] }
+    }
 }
 
 impl<L: Lane> StepParams<L> {

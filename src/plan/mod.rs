@@ -75,59 +75,31 @@ crate::saved::cloned!(StepPlan { passes });
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     blocks: Vec<Block>,
-    /// Whether impulses are summed over the substeps.
-    totals: bool,
-    /// Whether impulses of joints are summed.
-    joint_totals: bool,
     /// Whether the bodies of each block have equal moments of inertia. This can change, because joints add
     /// stiffness inertia in each step.
     isotropic: Vec<bool>,
-    has_torques: bool,
-    has_dampings: bool,
-    /// Whether joints have axes, and whether any axis is a limit or a drive.
-    axes: bool,
-    swept_axes: bool,
+    /// See [`StepProblem::parts`].
+    parts: [bool; 6],
 }
 
-crate::saved::cloned!(PlanKey {
-    colors,
-    blocks,
-    totals,
-    joint_totals,
-    isotropic,
-    has_torques,
-    has_dampings,
-    axes,
-    swept_axes
-});
+crate::saved::cloned!(PlanKey { colors, blocks, isotropic, parts });
 
 impl PlanKey {
     /// Whether this is the key of the plan of a problem.
     pub fn is_of(&self, problem: &StepProblem) -> bool {
         self.blocks == problem.blocks
             && self.colors == problem.colors
-            && self.has_torques != problem.torques.is_empty()
-            && self.has_dampings != problem.dampings.is_empty()
-            && self.totals != problem.totals.is_empty()
-            && self.joint_totals != problem.joint_totals.is_empty()
-            && self.axes != problem.axes.is_empty()
-            && self.swept_axes == problem.has_swept_axes()
+            && self.parts == problem.parts()
             && isotropic(problem).eq(self.isotropic.iter().copied())
     }
 
     /// The key of the plan of a problem.
     pub fn of(problem: &StepProblem) -> Self {
-        let isotropic = isotropic(problem).collect();
         Self {
             colors: problem.colors.clone(),
             blocks: problem.blocks.clone(),
-            totals: !problem.totals.is_empty(),
-            joint_totals: !problem.joint_totals.is_empty(),
-            isotropic,
-            has_torques: !problem.torques.is_empty(),
-            has_dampings: !problem.dampings.is_empty(),
-            axes: !problem.axes.is_empty(),
-            swept_axes: problem.has_swept_axes(),
+            isotropic: isotropic(problem).collect(),
+            parts: problem.parts(),
         }
     }
 }

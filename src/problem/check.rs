@@ -11,6 +11,26 @@ pub(super) fn refuse(what: impl Display) -> Result<()> {
     Err(Error::input(format!("step problem: {what}")))
 }
 
+/// Makes `count` parts of a row its own, and a patch after them if there is one. `owner` has the row of each part.
+fn claim(
+    owner: &mut [u32],
+    row: u32,
+    (first, count, patch): (usize, usize, usize),
+    [rows, field, parts]: [&str; 3],
+) -> Result<()> {
+    let all = owner.len();
+    let Some(own) = owner.get_mut(first..first + count + patch) else {
+        return refuse(format_args!(
+            "{rows}[{row}].{field} = {first}: {count} {parts} from there, but there are {all}"
+        ));
+    };
+    if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
+        return refuse(format_args!("{rows}[{row}].{field} = {first}: overlaps the {parts} of {rows}[{other}]"));
+    }
+    own.fill(row);
+    Ok(())
+}
+
 impl StepProblem {
     /// Refuses a problem with an index beyond the rows, with counts that do not match, or with a color that has a
     /// movable body twice. The check reads no other numbers, so numbers that are not finite pass.
@@ -120,18 +140,7 @@ impl StepProblem {
             if !(1..=MAX_POINTS).contains(&count) {
                 return refuse(format_args!("contacts[{row}].point_count = {count}: must be 1 to {MAX_POINTS}"));
             }
-            let Some(own) = owner.get_mut(first..first + count + patch) else {
-                let points = self.points.len();
-                return refuse(format_args!(
-                    "contacts[{row}].first_point = {first}: {count} points from there, but there are {points}"
-                ));
-            };
-            if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
-                return refuse(format_args!(
-                    "contacts[{row}].first_point = {first}: overlaps the points of contacts[{other}]"
-                ));
-            }
-            own.fill(row);
+            claim(&mut owner, row, (first, count, patch), ["contacts", "first_point", "points"])?;
         }
         Ok(())
     }
@@ -144,28 +153,13 @@ impl StepProblem {
             if axis_count as usize > MAX_AXES {
                 return refuse(format_args!("joints[{row}].axis_count = {axis_count}: must be at most {MAX_AXES}"));
             }
-            let (first, end) = (first_axis as usize, first_axis as usize + axis_count as usize);
-            let Some(own) = owner.get_mut(first..end) else {
-                let axes = self.axes.len();
-                return refuse(format_args!(
-                    "joints[{row}].first_axis = {first}: {axis_count} axes from there, but there are {axes}"
-                ));
-            };
-            if let Some(other) = own.iter().find(|&&other| other != u32::MAX) {
-                return refuse(format_args!(
-                    "joints[{row}].first_axis = {first}: overlaps the axes of joints[{other}]"
-                ));
-            }
-            own.fill(row);
+            claim(&mut owner, row, (first_axis as usize, axis_count as usize, 0), ["joints", "first_axis", "axes"])?;
         }
         Ok(())
     }
 
     fn check_order(&self) -> Result<()> {
-        let all = |kind: usize| {
-            let ends = self.blocks.first().zip(self.blocks.last());
-            self.rows_of(&ends.map_or(0..0, |(a, b)| a.colors()[kind].start..b.colors()[kind].end))
-        };
+        let all = |kind: usize| self.rows_of(&self.colors_of(|block| block.colors()[kind].clone()));
         let (bodies, inertias, systems, turning) = (all(2), all(3), all(4), all(5));
         for (name, rows, count) in [
             ("bodies", bodies, self.bodies.len()),
@@ -227,16 +221,13 @@ impl StepProblem {
                     }
                 }
             }
-            for &row in self.rows_of(&inertias) {
-                let body = self.inertias[row as usize].body;
+            let inertias = self.rows_of(&inertias).iter();
+            let inertias = inertias.map(|&row| ("inertias", row, self.inertias[row as usize].body));
+            let turning = self.rows_of(&turning).iter();
+            let turning = turning.map(|&row| ("turning", row, self.turning[row as usize].body));
+            for (rows, row, body) in inertias.chain(turning) {
                 if block_of[body as usize] != i {
-                    return refuse(format_args!("inertias[{row}]: body {body} is not of block {i}"));
-                }
-            }
-            for &row in self.rows_of(&turning) {
-                let body = self.turning[row as usize].body;
-                if block_of[body as usize] != i {
-                    return refuse(format_args!("turning[{row}]: body {body} is not of block {i}"));
+                    return refuse(format_args!("{rows}[{row}]: body {body} is not of block {i}"));
                 }
             }
         }

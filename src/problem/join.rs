@@ -17,12 +17,8 @@ pub(crate) struct Alike {
     friction: bool,
     restitution: bool,
     round: bool,
-    torques: bool,
-    dampings: bool,
-    totals: bool,
-    joint_totals: bool,
-    axes: bool,
-    swept_axes: bool,
+    /// See [`StepProblem::parts`].
+    parts: [bool; 6],
     /// With all counts zero.
     params: Params,
 }
@@ -44,12 +40,7 @@ impl Alike {
             friction,
             restitution,
             round,
-            torques: !problem.torques.is_empty(),
-            dampings: !problem.dampings.is_empty(),
-            totals: !problem.totals.is_empty(),
-            joint_totals: !problem.joint_totals.is_empty(),
-            axes: !problem.axes.is_empty(),
-            swept_axes: problem.has_swept_axes(),
+            parts: problem.parts(),
             params: Params { body_count: 0, point_count: 0, joint_count: 0, axis_count: 0, ..problem.params },
         })
     }
@@ -118,7 +109,7 @@ impl Begin {
 
 /// Writes several similar steps into one, and reuses its memory.
 pub(crate) fn join(problems: &[&mut StepProblem], all: &mut StepProblem) {
-    clear(all);
+    all.clone_from(&StepProblem::default());
     let mut begins = Vec::with_capacity(problems.len());
     let mut begin = Begin::default();
     for problem in problems {
@@ -161,58 +152,6 @@ fn take<T: Copy>(own: &mut [T], all: &[T], begin: u32) {
     if !own.is_empty() {
         own.copy_from_slice(&all[begin as usize..begin as usize + own.len()]);
     }
-}
-
-fn clear(all: &mut StepProblem) {
-    let StepProblem {
-        params,
-        bodies,
-        masses,
-        torques,
-        dampings,
-        inertias,
-        contacts,
-        points,
-        impulses,
-        totals,
-        sags,
-        joints,
-        axes,
-        joint_impulses,
-        joint_totals,
-        order,
-        colors,
-        blocks,
-        systems,
-        turning,
-        convergence,
-        momentum,
-    } = all;
-    (*params, *convergence, *momentum) = Default::default();
-    bodies.clear();
-    masses.clear();
-    torques.clear();
-    dampings.clear();
-    inertias.clear();
-    contacts.clear();
-    points.clear();
-    impulses.clear();
-    totals.clear();
-    sags.clear();
-    joints.clear();
-    axes.clear();
-    joint_impulses.clear();
-    joint_totals.clear();
-    order.clear();
-    colors.clear();
-    blocks.clear();
-    turning.clear();
-    let JointSystems { begins, softness, nodes, blocks, terms } = systems;
-    begins.clear();
-    softness.clear();
-    nodes.clear();
-    blocks.clear();
-    terms.clear();
 }
 
 /// Adds the rows of a world, with indices into the rows of all worlds.

@@ -50,9 +50,6 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::error::Result;
-use crate::saved::{Archive, Saved};
-
 /// The input of a backend for one step, and its output: `bodies`, `impulses`, `totals`, `joint_impulses`,
 /// `joint_totals`, `convergence` and `momentum`.
 ///
@@ -145,60 +142,36 @@ crate::saved::cloned!(StepProblem {
     momentum,
 });
 
-/// The state that the next step continues from, without the rows of contacts ([`ContactRows::walk`]). The step writes
-/// all other fields anew.
-impl Saved for StepProblem {
-    fn blank() -> Self {
-        Self::default()
-    }
-
-    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self {
-            params,
-            bodies: _,
-            masses: _,
-            torques: _,
-            dampings: _,
-            inertias: _,
-            contacts: _,
-            points: _,
-            impulses: _,
-            totals: _,
-            sags: _,
-            joints: _,
-            axes: _,
-            joint_impulses,
-            joint_totals: _,
-            order: _,
-            colors: _,
-            blocks: _,
-            systems,
-            turning: _,
-            convergence: _,
-            momentum: _,
-        } = self;
-        params.patches.walk(archive)?;
-        params.rolls.walk(archive)?;
-        params.driven.walk(archive)?;
-        joint_impulses.walk(archive)?;
-        systems.walk(archive)
-    }
-}
+// The state that the next step continues from, without the rows of contacts ([`ContactRows::walk`]). The step writes
+// all other fields anew.
+crate::saved::fields!(Params { patches, rolls, driven } scratch {
+    restitution_threshold, slop, relaxation, tolerance, body_count, point_count, joint_count, axis_count, zero
+});
+crate::saved::fields!(StepProblem { params, joint_impulses, systems } scratch {
+    bodies, masses, torques, dampings, inertias, contacts, points, impulses, totals, sags, joints, axes, joint_totals,
+    order, colors, blocks, turning, convergence, momentum
+});
 
 impl StepProblem {
     /// Colors of the contacts of all blocks.
     pub fn contact_colors(&self) -> Range<u32> {
-        0..self.blocks.last().map_or(0, |block| block.contacts[1])
+        self.colors_of(|block| block.contacts[0]..block.contacts[1])
     }
 
     /// Colors of the joints of all blocks.
     pub fn joint_colors(&self) -> Range<u32> {
-        self.blocks.first().map_or(0, |block| block.joints[0])..self.blocks.last().map_or(0, |block| block.joints[1])
+        self.colors_of(|block| block.joints[0]..block.joints[1])
     }
 
     /// Colors of the systems of joints of all blocks.
     pub fn system_colors(&self) -> Range<u32> {
-        self.blocks.first().zip(self.blocks.last()).map_or(0..0, |(first, last)| first.systems..last.systems + 1)
+        self.colors_of(|block| block.systems..block.systems + 1)
+    }
+
+    /// The colors of one kind in all blocks.
+    pub(crate) fn colors_of(&self, own: impl Fn(&Block) -> Range<u32>) -> Range<u32> {
+        let ends = self.blocks.first().zip(self.blocks.last());
+        ends.map_or(0..0, |(first, last)| own(first).start..own(last).end)
     }
 
     /// Whether any joints are solved directly.
@@ -270,6 +243,19 @@ impl StepProblem {
     /// Whether any axis is a limit or a drive.
     pub(crate) fn has_swept_axes(&self) -> bool {
         self.axes.iter().any(|axis| !axis.is_lock())
+    }
+
+    /// Whether there are torques, damping, sums of impulses, sums of impulses of joints, axes of joints, and axes that
+    /// are limits or drives.
+    pub(crate) fn parts(&self) -> [bool; 6] {
+        [
+            !self.torques.is_empty(),
+            !self.dampings.is_empty(),
+            !self.totals.is_empty(),
+            !self.joint_totals.is_empty(),
+            !self.axes.is_empty(),
+            self.has_swept_axes(),
+        ]
     }
 
     /// The impulse of a joint on its body b, from `joint_impulses` or `joint_totals`.

@@ -22,6 +22,16 @@ pub(crate) trait Saved: Sized {
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()>;
 }
 
+/// Writes or reads the fields of a value, in this order. Scratch fields stay unchanged.
+macro_rules! walk {
+    ($own:expr, $archive:expr, { $($field:ident),* $(,)? } $(scratch { $($scratch:ident),* $(,)? })?) => {{
+        let Self { $($field,)* $($($scratch: _,)*)? } = $own;
+        $($crate::saved::Saved::walk($field, $archive)?;)*
+        Ok(())
+    }};
+}
+pub(crate) use walk;
+
 /// Implements [`Saved`] by the fields, in this order. Scratch fields stay unchanged.
 macro_rules! fields {
     ($type:ty { $($field:ident),* $(,)? } $(scratch { $($scratch:ident),* $(,)? })?) => {
@@ -31,9 +41,7 @@ macro_rules! fields {
             }
 
             fn walk<A: $crate::saved::Archive>(&mut self, archive: &mut A) -> $crate::error::Result<()> {
-                let Self { $($field,)* $($($scratch: _,)*)? } = self;
-                $($crate::saved::Saved::walk($field, archive)?;)*
-                Ok(())
+                $crate::saved::walk!(self, archive, { $($field),* } $(scratch { $($scratch),* })?)
             }
         }
     };

@@ -24,6 +24,7 @@ use crate::stats::{StepStats, timed};
 use crate::world::{Body, BodyKind, JointHandle, Surface, World};
 
 /// Everything that a step passes to the next one, except the data on a device.
+#[derive(Default)]
 pub(super) struct Stages {
     pub detector: Detector,
     pub sleep: Sleep,
@@ -73,6 +74,7 @@ crate::saved::cloned!(Stages {
 });
 
 /// The settings and body properties for which all rows were written. Only a change of this value updates the state.
+#[derive(Default)]
 struct Key {
     config: SolverConfig,
     /// One entry for each body.
@@ -85,7 +87,7 @@ crate::saved::cloned!(Key { config, surfaces, scale });
 
 impl Saved for Key {
     fn blank() -> Self {
-        Self { config: SolverConfig::default(), surfaces: Vec::new(), scale: None }
+        Self::default()
     }
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
@@ -129,21 +131,8 @@ impl Stages {
         Self {
             detector: Detector::new(world),
             sleep: Sleep::new(world, config),
-            effort: Effort::default(),
-            energy: Energy::default(),
-            found: DetectStats::default(),
             key: Key { config: config.clone(), surfaces, scale: None },
-            contacts: ContactRows::default(),
-            joints: JointRows::default(),
-            problem: StepProblem::default(),
-            plan: StepPlan::default(),
-            events: Events::default(),
-            by_body: ByBody::default(),
-            plan_key: None,
-            points: 0,
-            bytes_moved: 0,
-            astray: Vec::new(),
-            is_foreign: false,
+            ..Self::default()
         }
     }
 

@@ -1,7 +1,6 @@
 //! The bodies of a world. Bodies can be inserted and removed at any time.
 
 use std::fmt;
-use std::ops::{Deref, Index, IndexMut};
 use std::slice;
 
 use glam::{Quat, Vec3};
@@ -357,64 +356,7 @@ impl Bodies {
     }
 }
 
-impl Deref for Bodies {
-    type Target = [Body];
-    fn deref(&self) -> &[Body] {
-        &self.all
-    }
-}
-
-impl<I: slice::SliceIndex<[Body]>> Index<I> for Bodies {
-    type Output = I::Output;
-    fn index(&self, index: I) -> &I::Output {
-        &self.all[index]
-    }
-}
-
-impl IndexMut<usize> for Bodies {
-    fn index_mut(&mut self, index: usize) -> &mut Body {
-        &mut self.all[index]
-    }
-}
-
-/// # Panics
-/// The body is gone. [`World::body`](super::World::body) returns `None` instead.
-impl Index<BodyHandle> for Bodies {
-    type Output = Body;
-    fn index(&self, handle: BodyHandle) -> &Body {
-        &self.all[self.index_of(handle).unwrap_or_else(|| gone(handle))]
-    }
-}
-
-/// # Panics
-/// The body is gone. [`World::body_mut`](super::World::body_mut) returns `None` instead.
-impl IndexMut<BodyHandle> for Bodies {
-    fn index_mut(&mut self, handle: BodyHandle) -> &mut Body {
-        let index = self.index_of(handle).unwrap_or_else(|| gone(handle));
-        &mut self.all[index]
-    }
-}
-
-#[cold]
-fn gone(handle: BodyHandle) -> ! {
-    panic!("{handle:?} names no body of this world")
-}
-
-impl<'a> IntoIterator for &'a Bodies {
-    type Item = &'a Body;
-    type IntoIter = slice::Iter<'a, Body>;
-    fn into_iter(self) -> Self::IntoIter {
-        self.all.iter()
-    }
-}
-
-impl<'a> IntoIterator for &'a mut Bodies {
-    type Item = &'a mut Body;
-    type IntoIter = slice::IterMut<'a, Body>;
-    fn into_iter(self) -> Self::IntoIter {
-        self.all.iter_mut()
-    }
-}
+super::list::list!(Bodies of Body, "body" by BodyHandle, index_of);
 
 impl IntoIterator for Bodies {
     type Item = Body;

@@ -431,53 +431,11 @@ impl Saved for Body {
 impl Body {
     /// Writes or reads every field except pose and velocity. Most bodies share these values.
     pub(super) fn walk_rest<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
-        let Self {
-            name,
-            kind,
-            position: _,
-            rotation: _,
-            linear_velocity: _,
-            angular_velocity: _,
-            force,
-            torque,
-            gravity_scale,
-            linear_damping,
-            angular_damping,
-            locked_rotations,
-            locked_translations,
-            max_linear_speed,
-            max_angular_speed,
-            can_sleep,
-            mass,
-            material,
-            groups,
-            swept,
-            colliders,
-            weight,
-            additional,
-            applied_force,
-            applied_torque,
-        } = self;
-        name.walk(archive)?;
-        kind.walk(archive)?;
-        for load in [force, torque, applied_force, applied_torque] {
-            load.walk(archive)?;
-        }
-        gravity_scale.walk(archive)?;
-        linear_damping.walk(archive)?;
-        angular_damping.walk(archive)?;
-        locked_rotations.walk(archive)?;
-        locked_translations.walk(archive)?;
-        max_linear_speed.walk(archive)?;
-        max_angular_speed.walk(archive)?;
-        can_sleep.walk(archive)?;
-        mass.walk(archive)?;
-        material.walk(archive)?;
-        groups.walk(archive)?;
-        swept.walk(archive)?;
-        colliders.walk(archive)?;
-        weight.walk(archive)?;
-        additional.walk(archive)
+        crate::saved::walk!(self, archive, {
+            name, kind, force, torque, applied_force, applied_torque, gravity_scale, linear_damping, angular_damping,
+            locked_rotations, locked_translations, max_linear_speed, max_angular_speed, can_sleep, mass, material,
+            groups, swept, colliders, weight, additional
+        } scratch { position, rotation, linear_velocity, angular_velocity })
     }
 
     /// A body of this kind, without shapes.

@@ -1,7 +1,6 @@
 //! The joints of a world. Joints can be inserted and removed at any time.
 
 use std::fmt;
-use std::ops::{Deref, Index, IndexMut};
 use std::slice;
 
 use super::joint::Joint;
@@ -149,61 +148,4 @@ impl Joints {
     }
 }
 
-impl Deref for Joints {
-    type Target = [Joint];
-    fn deref(&self) -> &[Joint] {
-        &self.all
-    }
-}
-
-impl<I: slice::SliceIndex<[Joint]>> Index<I> for Joints {
-    type Output = I::Output;
-    fn index(&self, index: I) -> &I::Output {
-        &self.all[index]
-    }
-}
-
-impl IndexMut<usize> for Joints {
-    fn index_mut(&mut self, index: usize) -> &mut Joint {
-        &mut self.all[index]
-    }
-}
-
-/// # Panics
-/// The joint is gone. [`World::joint`](super::World::joint) returns `None` instead.
-impl Index<JointHandle> for Joints {
-    type Output = Joint;
-    fn index(&self, handle: JointHandle) -> &Joint {
-        &self.all[self.index(handle).unwrap_or_else(|| gone(handle))]
-    }
-}
-
-/// # Panics
-/// The joint is gone. [`World::joint_mut`](super::World::joint_mut) returns `None` instead.
-impl IndexMut<JointHandle> for Joints {
-    fn index_mut(&mut self, handle: JointHandle) -> &mut Joint {
-        let index = self.index(handle).unwrap_or_else(|| gone(handle));
-        &mut self.all[index]
-    }
-}
-
-#[cold]
-fn gone(handle: JointHandle) -> ! {
-    panic!("{handle:?} names no joint of this world")
-}
-
-impl<'a> IntoIterator for &'a Joints {
-    type Item = &'a Joint;
-    type IntoIter = slice::Iter<'a, Joint>;
-    fn into_iter(self) -> Self::IntoIter {
-        self.all.iter()
-    }
-}
-
-impl<'a> IntoIterator for &'a mut Joints {
-    type Item = &'a mut Joint;
-    type IntoIter = slice::IterMut<'a, Joint>;
-    fn into_iter(self) -> Self::IntoIter {
-        self.all.iter_mut()
-    }
-}
+super::list::list!(Joints of Joint, "joint" by JointHandle, index);

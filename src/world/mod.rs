@@ -10,6 +10,7 @@ mod joint_motion;
 mod joints;
 mod lever;
 mod limits;
+mod list;
 mod mass;
 pub(crate) mod shape;
 mod shape_parts;

@@ -21,11 +21,9 @@ pub(super) trait Constraint: bytemuck::Pod + Sync {
     /// Indices of the row's numbers that the lanes hold, in the order of the kernels' struct. The last one of a joint
     /// is padding.
     const HEADER: [usize; 11];
-    fn colors(problem: &StepProblem) -> Range<u32>;
     fn own_colors(block: &Block) -> Range<u32>;
     fn rows(problem: &StepProblem) -> &[Self];
     fn impulses(problem: &StepProblem) -> &[[f32; 4]];
-    fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]);
     fn bodies(&self) -> [u32; 2];
     /// Number of contact points, 1 to 4; for a joint, its anchors and its axes.
     fn points(&self) -> u32;
@@ -41,9 +39,6 @@ impl Constraint for ContactRow {
     const HAS_POINTS: bool = true;
     /// Normal, tangent, friction, restitution, radii, preload.
     const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 3, 7, 12, 13, 14];
-    fn colors(problem: &StepProblem) -> Range<u32> {
-        problem.contact_colors()
-    }
     fn own_colors(block: &Block) -> Range<u32> {
         block.contacts[0]..block.contacts[1]
     }
@@ -52,9 +47,6 @@ impl Constraint for ContactRow {
     }
     fn impulses(problem: &StepProblem) -> &[[f32; 4]] {
         bytemuck::cast_slice(&problem.impulses)
-    }
-    fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]) {
-        (&problem.contacts, bytemuck::cast_slice_mut(&mut problem.impulses))
     }
     fn bodies(&self) -> [u32; 2] {
         [self.body_a, self.body_b]
@@ -77,9 +69,6 @@ impl Constraint for JointRow {
     const HAS_POINTS: bool = false;
     /// Arms, gap, and whether the anchors are free.
     const HEADER: [usize; 11] = [0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 15];
-    fn colors(problem: &StepProblem) -> Range<u32> {
-        problem.joint_colors()
-    }
     fn own_colors(block: &Block) -> Range<u32> {
         block.joints[0]..block.joints[1]
     }
@@ -88,9 +77,6 @@ impl Constraint for JointRow {
     }
     fn impulses(problem: &StepProblem) -> &[[f32; 4]] {
         bytemuck::cast_slice(&problem.joint_impulses)
-    }
-    fn impulses_mut(problem: &mut StepProblem) -> (&[Self], &mut [[f32; 4]]) {
-        (&problem.joints, bytemuck::cast_slice_mut(&mut problem.joint_impulses))
     }
     fn bodies(&self) -> [u32; 2] {
         [self.body_a, self.body_b]

@@ -76,17 +76,6 @@ impl<C: Constraint> LaneLayout<C> {
         threads.spread(0..len, &|range| instructions.run(&work, range));
     }
 
-    /// Stores the impulses in the problem.
-    pub fn store(
-        &self,
-        problem: &mut StepProblem,
-        impulses: &LaneImpulses,
-        (instructions, threads): (InstructionSet, &Threads),
-    ) {
-        let (rows, to) = C::impulses_mut(problem);
-        self.store_to(rows, impulses, to, (instructions, threads));
-    }
-
     /// Loads sums of impulses, in the layout of the impulses.
     pub fn load_sums(&self, problem: &StepProblem, from: &[[f32; 4]], sums: &mut LaneImpulses, threads: &Threads) {
         sums.resize(self.groups.last().map_or(0, |group| group.impulses().end), true);
@@ -105,7 +94,7 @@ impl<C: Constraint> LaneLayout<C> {
     }
 
     /// Stores impulses, or their sums, in the rows of the constraints `rows`.
-    pub fn store_to(
+    pub fn store(
         &self,
         rows: &[C],
         impulses: &LaneImpulses,
@@ -158,7 +147,7 @@ impl<C: Constraint> LaneLayout<C> {
     /// Groups the constraints of each color of each part by their number of points. Groups are in the order of their
     /// first rows, so that neighbors in the world stay neighbors.
     fn make_groups(&mut self, problem: &StepProblem, partition: &Partition, threads: &Threads) {
-        let (all, colors) = (C::rows(problem), C::colors(problem));
+        let (all, colors) = (C::rows(problem), problem.colors_of(C::own_colors));
         self.ranges.reset(colors.clone());
         self.rows.update(problem, partition, C::own_colors, |row| {
             let [a, b] = all[row as usize].bodies();

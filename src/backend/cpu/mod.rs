@@ -169,15 +169,17 @@ impl Cpu {
         let (rows, slots) = (Shared::new(&mut problem.bodies), &self.partition.slots);
         in_groups(slots.len() - 1, threads, &|range| store_bodies(&self.bodies, slots, range, &rows));
         let on = (self.instructions, threads);
-        self.contacts.store(problem, &self.contact_impulses, on);
+        let impulses = bytemuck::cast_slice_mut(&mut problem.impulses);
+        self.contacts.store(&problem.contacts, &self.contact_impulses, impulses, on);
         if !problem.totals.is_empty() {
             let totals = bytemuck::cast_slice_mut(&mut problem.totals);
-            self.contacts.store_to(&problem.contacts, &self.contact_totals, totals, on);
+            self.contacts.store(&problem.contacts, &self.contact_totals, totals, on);
         }
-        self.joints.store(problem, &self.joint_impulses, on);
+        let impulses = bytemuck::cast_slice_mut(&mut problem.joint_impulses);
+        self.joints.store(&problem.joints, &self.joint_impulses, impulses, on);
         if !problem.joint_totals.is_empty() {
             let totals = bytemuck::cast_slice_mut(&mut problem.joint_totals);
-            self.joints.store_to(&problem.joints, &self.joint_totals, totals, on);
+            self.joints.store(&problem.joints, &self.joint_totals, totals, on);
         }
         problem.convergence = self.convergence;
         problem.momentum = self.momentum.store();

@@ -143,12 +143,6 @@ impl Partition {
     }
 }
 
-/// The colors of one kind in all blocks.
-fn own_colors(problem: &StepProblem, own: impl Fn(&Block) -> Range<u32>) -> Range<u32> {
-    let ends = problem.blocks.first().zip(problem.blocks.last());
-    ends.map_or(0..0, |(first, last)| own(first).start..own(last).end)
-}
-
 fn ends_of_constraints(problem: &StepProblem) -> impl Iterator<Item = [u32; 2]> + Clone {
     let contacts = problem.swept_contacts().map(|c| [c.body_a, c.body_b]);
     let joints = problem.rows_of(&problem.joint_colors()).iter().map(|&row| &problem.joints[row as usize]);
@@ -216,7 +210,7 @@ impl PartitionedRows {
         own: impl Fn(&Block) -> Range<u32>,
         part_of: impl Fn(u32) -> u32,
     ) {
-        let colors = own_colors(problem, &own);
+        let colors = problem.colors_of(&own);
         let parts = partition.count;
         self.ranges.reset(colors.clone());
         let all = problem.rows_of(&colors);

@@ -147,64 +147,41 @@ impl Program {
     }
 }
 
-/// The rows of a kernel.
-enum RowRange {
-    /// This number of rows.
-    Count(&'static str),
-    /// The rows of the colors of a pass.
-    Colors,
-    /// The kernel finds its rows itself.
-    Own,
-}
-
-/// The files of a kernel, its rows, and the call of its function: for one `row`, or for all rows if the kernel finds
-/// them itself.
-fn kernel_text(kernel: Kernel, target: Target) -> (&'static [&'static str], RowRange, String) {
+/// The files of a kernel, and the call of its function: for one `row`, or for all rows if the kernel finds them itself.
+fn kernel_text(kernel: Kernel, target: Target) -> (&'static [&'static str], String) {
     let with = |name: &str, rules: Rules| format!("{name}({}, row)", rules_text(rules));
     match kernel {
         Kernel::IntegrateVelocities { warm_start, from_start } => {
             let call = format!("integrate_velocity({warm_start}, {from_start}, row)");
-            (&[part!("integrate_velocities")], RowRange::Colors, call)
+            (&[part!("integrate_velocities")], call)
         }
-        Kernel::BeginChanges => (&[part!("begin_changes")], RowRange::Colors, "begin_change(row)".into()),
-        Kernel::EndChanges => (&[part!("end_changes")], RowRange::Colors, "end_change(row)".into()),
+        Kernel::BeginChanges => (&[part!("begin_changes")], "begin_change(row)".into()),
+        Kernel::EndChanges => (&[part!("end_changes")], "end_change(row)".into()),
         Kernel::IntegrateTorques { from_start } => {
-            (&[part!("integrate_torques")], RowRange::Colors, format!("integrate_torque({from_start}, row)"))
+            (&[part!("integrate_torques")], format!("integrate_torque({from_start}, row)"))
         }
         Kernel::DampVelocities { from_start } => {
-            (&[part!("damp_velocities")], RowRange::Colors, format!("damp_velocity({from_start}, row)"))
+            (&[part!("damp_velocities")], format!("damp_velocity({from_start}, row)"))
         }
         Kernel::IntegrateGyroscopic { from_start } => {
-            (&[part!("integrate_gyroscopic")], RowRange::Colors, format!("turn_spin({from_start}, row)"))
+            (&[part!("integrate_gyroscopic")], format!("turn_spin({from_start}, row)"))
         }
         Kernel::IntegratePositions { from_start } => {
-            (&[part!("integrate_positions")], RowRange::Colors, format!("integrate_position({from_start}, row)"))
+            (&[part!("integrate_positions")], format!("integrate_position({from_start}, row)"))
         }
-        Kernel::ClearImpulses => (&[part!("clear_impulses")], RowRange::Colors, "clear_contact(row)".into()),
-        Kernel::SumImpulses { first } => {
-            (&[part!("sum_impulses")], RowRange::Colors, format!("sum_contact({first}, row)"))
-        }
-        Kernel::SumJointImpulses { first } => {
-            (&[part!("sum_joint_impulses")], RowRange::Colors, format!("sum_joint({first}, row)"))
-        }
-        Kernel::BeginSweep { first } => {
-            (&[part!("begin_sweep")], RowRange::Count("1u"), format!("begin_sweep({first})"))
-        }
+        Kernel::ClearImpulses => (&[part!("clear_impulses")], "clear_contact(row)".into()),
+        Kernel::SumImpulses { first } => (&[part!("sum_impulses")], format!("sum_contact({first}, row)")),
+        Kernel::SumJointImpulses { first } => (&[part!("sum_joint_impulses")], format!("sum_joint({first}, row)")),
+        Kernel::BeginSweep { first } => (&[part!("begin_sweep")], format!("begin_sweep({first})")),
         Kernel::Extrapolate { first, measured } => {
-            (&[part!("extrapolate")], RowRange::Own, format!("extrapolate({first}, {measured}, first, stride)"))
+            (&[part!("extrapolate")], format!("extrapolate({first}, {measured}, first, stride)"))
         }
-        Kernel::MeasureStep => (
-            &[part!("lib/sum"), part!("measure_step")],
-            RowRange::Own,
-            "measure_step(thread, group.x, groups.x)".into(),
-        ),
-        Kernel::UpdateMomentum => {
-            (&[part!("lib/sum"), part!("update_momentum")], RowRange::Own, "update_momentum(thread)".into())
+        Kernel::MeasureStep => {
+            (&[part!("lib/sum"), part!("measure_step")], "measure_step(thread, group.x, groups.x)".into())
         }
-        Kernel::WarmStartJoints { axes } => {
-            (of_joints!(axes, "warm_start_joints"), RowRange::Colors, "warm_start_joint(row)".into())
-        }
-        Kernel::TurnInertias => (&[part!("turn_inertias")], RowRange::Colors, "turn_inertia(row)".into()),
+        Kernel::UpdateMomentum => (&[part!("lib/sum"), part!("update_momentum")], "update_momentum(thread)".into()),
+        Kernel::WarmStartJoints { axes } => (of_joints!(axes, "warm_start_joints"), "warm_start_joint(row)".into()),
+        Kernel::TurnInertias => (&[part!("turn_inertias")], "turn_inertia(row)".into()),
         Kernel::BeginSystems => {
             let parts = &[
                 part!("lib/pair"),
@@ -213,25 +190,19 @@ fn kernel_text(kernel: Kernel, target: Target) -> (&'static [&'static str], RowR
                 part!("lib/joint_system"),
                 part!("begin_systems"),
             ];
-            (parts, RowRange::Colors, "begin_system(row)".into())
+            (parts, "begin_system(row)".into())
         }
-        Kernel::MeasureJoints(rules) => {
-            (of_joints!(true, "measure_joints"), RowRange::Colors, with("measure_joint", rules))
-        }
+        Kernel::MeasureJoints(rules) => (of_joints!(true, "measure_joints"), with("measure_joint", rules)),
         Kernel::SolveJointSystems(rules) => {
             let parts = &[part!("lib/joint_system"), part!("solve_joint_systems")];
-            (parts, RowRange::Colors, with("solve_system", rules))
+            (parts, with("solve_system", rules))
         }
         Kernel::ApplyJointChanges(rules) => {
-            (of_joints!(true, "apply_joint_changes"), RowRange::Colors, with("apply_joint_change", rules))
+            (of_joints!(true, "apply_joint_changes"), with("apply_joint_change", rules))
         }
-        Kernel::SolveJoints(rules) => {
-            (of_joints!(rules.axes, "solve_joints"), RowRange::Colors, with("solve_joint", rules))
-        }
-        Kernel::SolveAxes(rules) => (of_joints!(true, "solve_axes"), RowRange::Colors, with("solve_swept_axes", rules)),
-        Kernel::WarmStart(rules) => {
-            (&[part!("lib/pair"), part!("warm_start")], RowRange::Colors, with("warm_start_contact", rules))
-        }
+        Kernel::SolveJoints(rules) => (of_joints!(rules.axes, "solve_joints"), with("solve_joint", rules)),
+        Kernel::SolveAxes(rules) => (of_joints!(true, "solve_axes"), with("solve_swept_axes", rules)),
+        Kernel::WarmStart(rules) => (&[part!("lib/pair"), part!("warm_start")], with("warm_start_contact", rules)),
         Kernel::SolveContacts(rules) => {
             macro_rules! with_points {
                 ($points:literal) => {
@@ -248,13 +219,11 @@ fn kernel_text(kernel: Kernel, target: Target) -> (&'static [&'static str], RowR
                 Target::Hardware => with_points!("lib/points_in_registers"),
                 Target::Software => with_points!("lib/points_in_memory"),
             };
-            (parts, RowRange::Colors, with("solve_contact", rules))
+            (parts, with("solve_contact", rules))
         }
-        Kernel::ApplyRestitution(rules) => (
-            &[part!("lib/pair"), part!("lib/contact"), part!("apply_restitution")],
-            RowRange::Colors,
-            with("restitute_contact", rules),
-        ),
+        Kernel::ApplyRestitution(rules) => {
+            (&[part!("lib/pair"), part!("lib/contact"), part!("apply_restitution")], with("restitute_contact", rules))
+        }
     }
 }
 
@@ -311,16 +280,17 @@ fn of_plan(
     ];
     let (mut calls, mut loops) = (Vec::new(), String::new());
     for (at, &kernel) in kernels.iter().enumerate() {
-        let (own, over, call) = kernel_text(kernel, target);
+        let (own, call) = kernel_text(kernel, target);
         for part in own {
             if !parts.contains(part) {
                 parts.push(part);
             }
         }
-        calls.push(match over {
-            RowRange::Own => format!("{call};"),
-            RowRange::Count(count) => over_count(count, &call),
-            RowRange::Colors => {
+        calls.push(match kernel {
+            // These kernels find their rows themselves.
+            Kernel::Extrapolate { .. } | Kernel::MeasureStep | Kernel::UpdateMomentum => format!("{call};"),
+            Kernel::BeginSweep { .. } => over_count("1u", &call),
+            _ => {
                 let [rows, colors] = ["over_rows", "over_colors"].map(|name| format!("{name}_{at}"));
                 loops += &part!("lib/over_rows").replace("over_rows", &rows).replace("over_row(row)", &call);
                 if fused {

@@ -125,16 +125,21 @@ impl WorldContacts {
         if A::READS {
             self.keys = records.iter().map(|record| record.key).collect();
             let begun = records.par_iter().with_min_len(512).map(|record| record.begin(&self.colliders));
-            self.pairs = Pairs::of(begun.unzip());
+            let (all, tracks) = begun.unzip();
+            self.pairs = Pairs { all, tracks };
         }
         for (i, _) in records.iter().enumerate().filter(|(_, record)| !record.flags.is_plain) {
-            let (pair, track) = self.pairs.with_track_mut(i);
-            let mut rest = PairRest::of(pair, track);
-            rest.walk(archive)?;
-            rest.give(pair, track);
+            // The data that a pair copies from its colliders.
+            let (pair, track) = (&mut self.pairs.all[i], &mut self.pairs.tracks[i]);
+            pair.body_a.walk(archive)?;
+            pair.body_b.walk(archive)?;
+            pair.size.walk(archive)?;
+            track.reach_b.walk(archive)?;
+            track.unbounded.walk(archive)?;
+            (track.bodies, track.size) = ([pair.body_a, pair.body_b], pair.size);
         }
         let exist = |track: &Track| track.bodies.iter().all(|&body| body < known);
-        ensure(self.pairs.tracks().par_iter().with_min_len(512).all(exist), || {
+        ensure(self.pairs.tracks.par_iter().with_min_len(512).all(exist), || {
             format!("a pair is of a body beyond the last of {known}")
         })?;
         walk_places_then(&mut self.pairs, known as usize, world, archive)?;
@@ -164,7 +169,7 @@ impl WorldContacts {
     }
 
     fn record(&self, i: usize, are_current: &[bool]) -> PairRecord {
-        let (pair, track) = self.pairs.with_track(i);
+        let (pair, track) = (&self.pairs[i], &self.pairs.tracks[i]);
         let key = self.keys[i];
         let plain = || Track::of(&Pair::new(pair.collider_a, pair.collider_b, &self.colliders), &self.colliders);
         let is_plain = are_current[key.0 as usize] && are_current[key.1 as usize] && is_plain(pair, track, &plain());
@@ -210,28 +215,6 @@ impl WorldContacts {
             *own.ok_or_else(|| input!("manifold {manifold} of {count} has two slots"))? = Some(slot);
         }
         Ok(slots.into_iter().map(|slot| slot.unwrap_or(NO_SLOT)).collect())
-    }
-}
-
-/// The data that a pair copies from its colliders.
-struct PairRest {
-    bodies: [u32; 2],
-    size: f32,
-    reach_b: f32,
-    unbounded: f32,
-}
-
-crate::saved::fields!(PairRest { bodies, size, reach_b, unbounded });
-
-impl PairRest {
-    fn of(pair: &Pair, track: &Track) -> Self {
-        Self { bodies: [pair.body_a, pair.body_b], size: pair.size, reach_b: track.reach_b, unbounded: track.unbounded }
-    }
-
-    fn give(self, pair: &mut Pair, track: &mut Track) {
-        let Self { bodies, size, reach_b, unbounded } = self;
-        ([pair.body_a, pair.body_b], pair.size) = (bodies, size);
-        (track.bodies, track.size, track.reach_b, track.unbounded) = (bodies, size, reach_b, unbounded);
     }
 }
 

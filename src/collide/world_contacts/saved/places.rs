@@ -53,7 +53,7 @@ pub(super) fn walk_places_then<A: Archive>(
     world: &World,
     archive: &mut A,
 ) -> Result<()> {
-    let tracks = pairs.tracks();
+    let tracks = &pairs.tracks;
     let Sides { begins, all, places } = Sides::of(tracks, bodies);
     let read = archive.chunks(bodies, ROTATION + 2, |range, columns| {
         let mut read = Vec::new();
@@ -77,7 +77,7 @@ pub(super) fn walk_places_then<A: Archive>(
                 track.then = [0, 1].map(|k| read[own[k] as usize]);
             }
         };
-        pairs.tracks_mut().par_iter_mut().zip(places.par_chunks(2)).with_min_len(512).for_each(give);
+        pairs.tracks.par_iter_mut().zip(places.par_chunks(2)).with_min_len(512).for_each(give);
     }
     Ok(())
 }

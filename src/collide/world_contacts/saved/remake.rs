@@ -18,7 +18,7 @@ const PAIRS_A_TASK: usize = 512;
 impl WorldContacts {
     /// Whether the manifolds of a pair can be recomputed, if its colliders and their data are unchanged.
     pub(super) fn is_remade(&self, i: usize) -> bool {
-        let then = self.pairs.computed_at(i).filter(|_| self.pairs.with_track(i).1.predicted != ANEW);
+        let then = self.pairs.computed_at(i).filter(|_| self.pairs.tracks[i].predicted != ANEW);
         then.is_some_and(|then| then.iter().all(|place| place.is_centered == 1.0))
             && !self.pairs[i].manifolds.is_empty()
             && !self.pairs[i].is_mended
@@ -41,7 +41,7 @@ impl WorldContacts {
     /// pair.
     pub(super) fn remake(&mut self, wanted: &[u32], counts: &[u32], mut slots: &[u32]) -> Result<()> {
         let can_be = |&i: &u32| {
-            let (_, Track { predicted, then, .. }) = self.pairs.with_track(i as usize);
+            let Track { predicted, then, .. } = &self.pairs.tracks[i as usize];
             then.iter().all(|place| is_placed(place.center, place.rotation, FARTHEST)) && *predicted >= 0.0
         };
         ensure(wanted.par_iter().all(can_be), || "a pair was computed where nothing can be".to_owned())?;
@@ -67,28 +67,13 @@ impl WorldContacts {
         let mut scratch = PairScratch::default();
         let mut again = self.pairs[first as usize].clone();
         let begin = |pair: &Pair, again: &mut Pair| {
-            let Pair {
-                body_a, body_b, colliders, collider_a, collider_b, size, takes_part, is_mended, is_refused, ..
-            } = *pair;
-            let mut manifolds = std::mem::take(&mut again.manifolds);
-            manifolds.clear();
-            *again = Pair {
-                body_a,
-                body_b,
-                manifolds,
-                colliders,
-                collider_a,
-                collider_b,
-                size,
-                takes_part,
-                is_mended,
-                is_refused,
-            };
+            again.clone_from(pair);
+            again.manifolds.clear();
         };
         let mut states = Vec::with_capacity(2 * chunk.len());
         let mut cuboids = Vec::with_capacity(chunk.len());
         for (number, &i) in chunk.iter().enumerate() {
-            let (pair, track) = self.pairs.with_track(i as usize);
+            let (pair, track) = (&self.pairs[i as usize], &self.pairs.tracks[i as usize]);
             let state = |&Placed { rotation, center, .. }: &Placed| BodyState {
                 rotation,
                 center,
@@ -114,7 +99,8 @@ impl WorldContacts {
         let set = InstructionSet::default();
         cuboid_contacts(set, &states, &self.cuboids, &cuboids, &mut CuboidScratch::default(), &mut |number, write| {
             let number = number as usize;
-            let (pair, track) = self.pairs.with_track(chunk[number] as usize);
+            let i = chunk[number] as usize;
+            let (pair, track) = (&self.pairs[i], &self.pairs.tracks[i]);
             begin(pair, &mut again);
             again.take_over(self.sides_of(pair, &states[2 * number..]), track.predicted, write, None, &mut scratch);
             with(number, &mut again.manifolds);
