@@ -4,10 +4,12 @@
 //! stays on its side of every plane enters nothing, however long it is. So one piece of the motion is a convex problem,
 //! the vector within the half-spaces that is nearest to the wanted one (`nearest.rs`). The planes are computed anew at
 //! the end of a piece, until no motion is left. There are no casts, and no rule decides in which order walls count.
+//! A motion deepens no overlap, and ends those that it can end.
 //!
 //! Three laws describe the legs:
 //! - A contact carries the character if the surface has a normal within the limit of slopes there, and if it is not
-//!   higher than a step above the feet. Steeper surfaces are walls for its walk.
+//!   higher than a step above the feet. Steeper surfaces are walls for its walk. An edge has the normals of all faces
+//!   that meet there, so it does not matter how a surface is cut into triangles and bodies.
 //! - After a walk the feet go down by up to a step, until a surface carries them. So the character stays on stairs,
 //!   slopes and edges.
 //! - If something stops the walk, the character tries the same walk from a step higher up, and takes the path that ends

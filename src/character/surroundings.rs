@@ -282,12 +282,7 @@ impl<'a> Surroundings<'a> {
                 spaces.push(HalfSpace { normal: across / steepness, least: space.least.min(0.0) / steepness });
             }
         }
-        let rest = rest.as_dvec3();
-        let out_of_overlap = |share: f64| {
-            let eased = |space: &HalfSpace| HalfSpace { least: space.least.min(share * space.least), ..*space };
-            nearest(rest, &spaces.iter().map(eased).collect::<Vec<_>>())
-        };
-        let piece = SHARES.into_iter().find_map(out_of_overlap).unwrap_or(DVec3::ZERO);
+        let piece = out_of_overlaps(rest.as_dvec3(), &spaces);
         // Rounding of nearly parallel planes must not cause an overlap either.
         let loose = spaces.iter().map(|space| (space, 0.1 * f64::from(self.exact)));
         let fixed = holds.iter().map(|space| (space, 0.0));
@@ -332,4 +327,27 @@ impl<'a> Surroundings<'a> {
         let left = nearest(velocity.as_dvec3(), &near.map(space).collect::<Vec<_>>());
         left.map_or(Vec3::ZERO, DVec3::as_vec3)
     }
+}
+
+/// The vector nearest to `rest` that leads out of overlaps and deepens none.
+///
+/// An overlap cannot end if others become deeper on every way out of it. It waits, and the rest of them end: the mean of
+/// motions that each lead out of one overlap leads out of all of those.
+fn out_of_overlaps(rest: DVec3, spaces: &[HalfSpace]) -> DVec3 {
+    let within = |share: &dyn Fn(usize) -> f64| {
+        let eased = |(k, space): (usize, &HalfSpace)| {
+            let least = space.least.min(share(k) * space.least);
+            HalfSpace { least, ..*space }
+        };
+        nearest(rest, &spaces.iter().enumerate().map(eased).collect::<Vec<_>>())
+    };
+    let one_by_one = || {
+        let alone = |k: usize| {
+            let ends = |share: &f64| within(&|other| if other == k { *share } else { 0.0 }).is_some();
+            SHARES.into_iter().find(ends).unwrap_or(0.0)
+        };
+        let most: Vec<f64> = (0..spaces.len()).map(alone).collect();
+        SHARES.into_iter().find_map(|share| within(&|k| share * most[k]))
+    };
+    within(&|_| 1.0).or_else(one_by_one).unwrap_or(DVec3::ZERO)
 }

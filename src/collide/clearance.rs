@@ -26,6 +26,9 @@ pub(crate) struct Clearance {
     pub upright: Vec3,
 }
 
+/// Distance up to which a face holds a point, relative to the smallest half extent of the thinner shape.
+const HOLDS: f32 = 2.0 * EXACT;
+
 thread_local! {
     static SCRATCH: RefCell<(ClipBuffers, Vec<ParryManifold>)> = RefCell::default();
 }
@@ -74,8 +77,8 @@ pub(crate) fn clearances(
                 });
                 is_found
             };
-            let beside = &mut Beside { around, goes_on: &mut goes_on };
-            composite_contacts(&*fixed.0, &*moving.0, &pos12, search, beside, buffers, many);
+            let rims = &mut Beside { around, goes_on: &mut goes_on };
+            composite_contacts(&*fixed.0, &*moving.0, &pos12, search, rims, buffers, many);
             for found in many.iter() {
                 let Some(triangle) = triangle_of(fixed, found.subshape1) else { continue };
                 let corners = triangle.vertices().map(|corner| *pose * corner);
@@ -88,7 +91,20 @@ pub(crate) fn clearances(
                 let face = if face.dot(first) < 0.0 { -face } else { face };
                 let normal = if along(face) > along(first) { face } else { first };
                 let point = *pose * nearest_point(found, size);
-                tell(Clearance { normal, distance: along(normal), point, upright: higher(normal, face) });
+                let mut upright = higher(normal, face);
+                if normal != face {
+                    // Other triangles hold the point on an edge. This one lies behind them, unless it rises from them.
+                    let mut holds = |beyond: Vec3| {
+                        if furthest(beyond) <= beyond.dot(point) + HOLDS * size {
+                            upright = higher(upright, beyond);
+                        }
+                    };
+                    rim::each_face_at((&*fixed.0, *pose), point, HOLDS * size, &mut holds);
+                    beside(point, around, &mut |other, stood| {
+                        rim::each_face_at((&*other.0, stood), point, around, &mut holds);
+                    });
+                }
+                tell(Clearance { normal, distance: along(normal), point, upright });
             }
             return;
         };
@@ -112,7 +128,7 @@ pub(crate) fn clearances(
         let point = *pose * nearest_point(&found, size);
         let mut upright = normal;
         other.each_normal(|face| {
-            if face.dot(point) > furthest(face) - 2.0 * EXACT * size {
+            if face.dot(point) > furthest(face) - HOLDS * size {
                 upright = higher(upright, face);
             }
         });

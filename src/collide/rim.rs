@@ -12,7 +12,7 @@ use parry3d::query::PointQuery;
 use parry3d::shape::{Shape, Triangle, TrianglePseudoNormals};
 
 use super::cone::FacetCone;
-use super::solid::EXACT;
+use super::solid::{EXACT, Solid};
 
 /// Length over which a shape is followed from an edge, in flush distances. It goes on if it lies within 60 degrees of
 /// the plane of the triangle: the projection of this length onto it then reaches one flush distance ahead.
@@ -85,6 +85,25 @@ pub(super) fn each_triangle(composite: &dyn Shape, around: &Aabb, mut with: impl
     } else if let Some(field) = composite.as_heightfield() {
         field.map_elements_in_local_aabb(around, &mut |number, triangle| with(Facet { composite, number }, triangle));
     }
+}
+
+/// Calls `with` on the normals of the faces that hold a point of a shape at a pose, within the distance `around` (m).
+pub(super) fn each_face_at((shape, pose): (&dyn Shape, Pose), p: Vec3, around: f32, with: &mut dyn FnMut(Vec3)) {
+    if let Some(solid) = Solid::or_point(shape, pose) {
+        if solid.is_near(p, around) {
+            solid.each_normal(|face| {
+                if face.dot(solid.furthest(face) - p) <= around {
+                    with(face);
+                }
+            });
+        }
+        return;
+    }
+    let p = pose.inverse_transform_point(p);
+    each_triangle(shape, &Aabb::from_half_extents(p, Vec3::splat(around)), |_, triangle| {
+        let holds = triangle.distance_to_local_point(p, true) <= around;
+        triangle.normal().filter(|_| holds).into_iter().for_each(|normal| with(pose.rotation * normal));
+    });
 }
 
 /// Whether a shape at a pose holds a point, within the distance `around` (m), and goes on from there in a direction.

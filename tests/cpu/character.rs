@@ -232,6 +232,113 @@ fn stairs_are_walked_up_and_down_on_the_ground() {
     assert!((walk.position() - MIDDLE * Vec3::Y).length() < 0.1, "{}", walk.position());
 }
 
+/// Surfaces along z, through a line of points (x, y), as a mesh: each of them is cut into strips and triangles at
+/// random. The strips share their corners, or each has its own.
+fn profile(random: &mut Random, line: &[(f32, f32)], turn: Quat) -> Shape {
+    let (mut points, mut triangles): (Vec<Vec3>, Vec<[u32; 3]>) = Default::default();
+    let (cuts, is_shared) = (1 + random.below(4) as usize, random.happens(0.5));
+    let places: Vec<f32> = (0..=cuts).map(|k| 4.0 * (k as f32 / cuts as f32 - 0.5)).collect();
+    let mut number = |at: Vec3| {
+        let old = points.iter().position(|&old| old == at).filter(|_| is_shared);
+        old.unwrap_or_else(|| {
+            points.push(at);
+            points.len() - 1
+        }) as u32
+    };
+    for ends in line.windows(2) {
+        for z in places.windows(2) {
+            let corner = |(x, y): (f32, f32), z: f32| turn * Vec3::new(x, y, z);
+            let [a, b] = [ends[0], ends[1]].map(|end| [z[0], z[1]].map(|z| number(corner(end, z))));
+            let [(a, d), (b, c)] = [(a[0], a[1]), (b[0], b[1])];
+            triangles.extend(if random.happens(0.5) { [[a, d, c], [a, c, b]] } else { [[a, d, b], [d, c, b]] });
+        }
+    }
+    Shape::mesh(points, triangles).expect("a mesh")
+}
+
+#[test]
+fn stairs_of_any_triangles_are_climbed_without_a_stop() {
+    (0..100_u64).into_par_iter().for_each(|seed| {
+        let mut random = Random::new(seed);
+        let (rise, run) = (random.within(0.1, 0.98) * STEP, random.within(0.25, 0.6));
+        let mut line = vec![(-2.0, 0.0)];
+        for k in 0..8 {
+            line.extend([0.0, 1.0].map(|up| (1.0 + run * k as f32, rise * (k as f32 + up))));
+        }
+        line.push((1.0 + 8.0 * run + 3.0, 8.0 * rise));
+        let turn = Quat::from_rotation_y(random.within(0.0, 6.0));
+        let mut world = World::new();
+        // One body, or a body for each surface.
+        let lines = if random.happens(0.5) { vec![&line[..]] } else { line.windows(2).collect() };
+        for line in lines {
+            world.insert(Body::fixed().shape(profile(&mut random, line, turn)));
+        }
+        let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
+        let (ahead, aside) = (turn * Vec3::X, turn * Vec3::Z);
+        let velocity = random.within(0.5, 6.0) * (ahead + random.within(-0.1, 0.1) * aside).normalize();
+        walk.step(Vec3::ZERO);
+        let mut far = 0.0;
+        while far < 1.0 + 8.0 * run {
+            let at = walk.position();
+            let ground = walk.step(velocity).ground;
+            far = ahead.dot(walk.position());
+            assert!(ground.is_some(), "seed {seed}: in the air after {at}");
+            assert!(far > ahead.dot(at) + 0.01 * DT, "seed {seed}: it stops at {at}");
+        }
+        let end = walk.position().y - MIDDLE - 8.0 * rise;
+        assert!(end.abs() < MARGIN, "seed {seed}: {end} m");
+    });
+}
+
+#[test]
+fn a_slope_of_any_triangles_above_the_limit_is_a_wall() {
+    for seed in 0..200 {
+        let mut random = Random::new(seed);
+        let (sine, cosine) = random.within(46.0, 85.0_f32).to_radians().sin_cos();
+        let high = random.within(1.2, 3.0) * STEP;
+        let line = [(-4.0, 0.0), (1.0, 0.0), (1.0 + high * cosine / sine, high), (4.0, high)];
+        let turn = Quat::from_rotation_y(random.within(0.0, 6.0));
+        let mut world = World::new();
+        world.insert(Body::fixed().shape(profile(&mut random, &line, turn)));
+        let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
+        walk.step(Vec3::ZERO);
+        let velocity = random.within(0.5, 6.0) * (turn * Vec3::X);
+        for _ in 0..120 {
+            walk.step(velocity + random.within(-0.5, 0.5) * (turn * Vec3::Z));
+            assert!((walk.position().y - MIDDLE).abs() < MARGIN, "seed {seed}: {}", walk.position());
+        }
+    }
+}
+
+#[test]
+fn it_rises_out_of_steep_slopes_though_a_wall_pushes_it_aside() {
+    for seed in 0..200 {
+        let mut random = Random::new(seed);
+        let mut world = floor();
+        // Two slopes that cross in the character, and a wall on one side that is lower than they are.
+        let degrees = random.within(60.0, 80.0_f32);
+        for side in [1.0, -1.0] {
+            let turn = Quat::from_rotation_z(side * degrees.to_radians());
+            world.insert(block(Vec3::new(1.0, 0.1, 1.0), Vec3::ZERO).rotation(turn));
+        }
+        let low = 0.5 * random.within(0.1, 0.8);
+        world.insert(block(Vec3::new(0.5, low, 1.0), Vec3::new(-0.5 - random.within(-0.1, 0.2), low, 0.0)));
+        let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
+        let mut highest = walk.position().y;
+        for _ in 0..30 {
+            walk.step(Vec3::ZERO);
+            let at = walk.position();
+            assert!(at.y > highest - 1e-5, "seed {seed}: it falls from {highest} to {}", at.y);
+            highest = highest.max(at.y);
+        }
+        let (filter, queries) = (Filter::default().except(walk.character.body), walk.simulation.queries());
+        let capsule = Shape::capsule(0.5 * HEIGHT - RADIUS, RADIUS);
+        let near = queries.contacts(&capsule, walk.position(), Quat::IDENTITY, MARGIN, &filter);
+        assert!(near.iter().all(|hit| hit.distance > 0.5 * MARGIN), "seed {seed}: {near:?} at {}", walk.position());
+        assert!(walk.character.ground().is_some(), "seed {seed}: in the air at {}", walk.position());
+    }
+}
+
 #[test]
 fn it_falls_jumps_and_lands_like_a_stone() {
     let mut walk = Walk::at(floor(), (MIDDLE + 2.0) * Vec3::Y);

@@ -1791,7 +1791,6 @@ fn climb(stairs: &[Body]) {
 
 /// Jolt, CharacterVirtualTests: TestWalkStairs.
 #[test]
-#[ignore = "the character stops at an edge of the mesh: at 60 Hz on the fourth step, else at the first"]
 fn a_character_climbs_stairs_of_triangles_without_a_stop() {
     let mut points = Vec::new();
     let mut triangles = Vec::new();
@@ -1879,7 +1878,6 @@ fn a_character_leaves_a_box_that_it_overlaps() {
 
 /// Jolt, CharacterVirtualTests: TestInitiallyIntersecting2.
 #[test]
-#[ignore = "the character stays stuck between the slopes; Jolt's rises by more than 0.5 m, and then walks 2 m"]
 fn a_character_rises_out_of_two_steep_slopes_and_walks_away() {
     let mut world = with_floor();
     world.insert(Body::fixed().shape(cube(0.5)).position(-0.5, 0.5, 0.0));
