@@ -147,14 +147,15 @@ fn solve_normal<L: Lane>(
 /// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
 /// still lack. `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. The
 /// common change of all points is one impulse at their middle, and no point takes more than its share because it comes
-/// first. A point may pull after this, until it is solved alone.
+/// first. A point may pull after this, until it is solved alone. `wanted` has no closure, which would be compiled
+/// without SIMD instructions.
 #[inline(always)]
 fn press_as_one<L: Lane>(
     rules: Rules,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
     rows: &mut impl PointRows<L>,
-    wanted: impl Fn(&Pair<L>, &Point<L>, &Impulse<L>) -> (L, L),
+    wanted: &[(L, L); MAX_POINTS],
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let mut changes = [zero; MAX_POINTS];
@@ -163,9 +164,8 @@ fn press_as_one<L: Lane>(
     let (mut middle_a, mut middle_b) = (Vec3::default(), Vec3::default());
     for (k, own) in changes.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
         let point = rows.point(k);
-        let impulse = rows.impulse(k);
-        let (sum, lacking) = wanted(pair, &point, &impulse);
-        let change = sum - impulse.normal;
+        let (sum, lacking) = wanted[k];
+        let change = sum - rows.impulse(k).normal;
         *own = change;
         arms_a += point.r_a * change;
         arms_b += point.r_b * change;
@@ -225,10 +225,13 @@ fn solve_as_one<L: Lane>(
     contact: &Contact<L>,
     rows: &mut impl PointRows<L>,
 ) {
-    press_as_one(rules, pair, contact, rows, |pair, point, impulse| {
-        let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
-        (clamp_normal(rules, impulse.normal, correction), lacking(point, correction))
-    });
+    let mut wanted = [(L::constant(0.0), L::constant(0.0)); MAX_POINTS];
+    for (k, wanted) in wanted.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
+        let (point, impulse) = (rows.point(k), rows.impulse(k));
+        let correction = normal_correction(rules, params, common, pair, contact, &point, impulse.normal);
+        *wanted = (clamp_normal(rules, impulse.normal, correction), lacking(&point, correction));
+    }
+    press_as_one(rules, pair, contact, rows, &wanted);
 }
 
 /// Clears the impulse of one point, but not its peak. Kernel `clear_impulses`.
@@ -356,21 +359,36 @@ pub fn restitute_contact<L: Lane>(
     contact: &Contact<L>,
     rows: &mut impl PointRows<L>,
 ) {
-    let zero = L::constant(0.0);
-    let bounce = |pair: &Pair<L>, point: &Point<L>, impulse: &Impulse<L>| {
-        let hit = (-params.restitution_threshold).gt(point.approach_velocity);
-        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
-        let lacking = -(vn + contact.restitution * point.approach_velocity);
-        let sum = larger(impulse.normal + point.normal_mass * lacking, zero);
-        (L::select(impulse.normal, sum, L::and(hit, impulse.peak.gt(zero))), lacking)
-    };
-    press_as_one(rules, pair, contact, rows, bounce);
+    let mut wanted = [(L::constant(0.0), L::constant(0.0)); MAX_POINTS];
+    for (k, wanted) in wanted.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
+        *wanted = bounce(rules, params, pair, contact, &rows.point(k), &rows.impulse(k));
+    }
+    press_as_one(rules, pair, contact, rows, &wanted);
     for k in 0..rules.contact_points(rows.count()) {
         let (point, impulse) = (rows.point(k), rows.impulse(k));
-        let (sum, _) = bounce(pair, &point, &impulse);
+        let (sum, _) = bounce(rules, params, pair, contact, &point, &impulse);
         let change = sum - impulse.normal;
         rows.set_normal(k, sum);
         rows.set_peak(k, larger(impulse.peak, sum));
         apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
     }
+}
+
+/// The normal impulse with which a point bounces by itself, if it was hit fast enough, and the normal velocity that it
+/// lacks.
+#[inline(always)]
+fn bounce<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    pair: &Pair<L>,
+    contact: &Contact<L>,
+    point: &Point<L>,
+    impulse: &Impulse<L>,
+) -> (L, L) {
+    let zero = L::constant(0.0);
+    let hit = (-params.restitution_threshold).gt(point.approach_velocity);
+    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
+    let lacking = -(vn + contact.restitution * point.approach_velocity);
+    let sum = larger(impulse.normal + point.normal_mass * lacking, zero);
+    (L::select(impulse.normal, sum, L::and(hit, impulse.peak.gt(zero))), lacking)
 }
