@@ -1,4 +1,4 @@
-//! Blows: the contacts whose points are swept together, because the surfaces meet at speed or pass a blow on.
+//! Blows: the contacts whose points are swept together, because surfaces of their island meet at speed.
 
 use glam::Vec3;
 
@@ -17,9 +17,9 @@ pub struct Blows {
     jointed: Vec<bool>,
     /// Whether any part of each body may be faster than half the threshold of restitution.
     fast: Vec<bool>,
-    /// The islands of fast dynamic bodies that touch and move together.
+    /// The islands of dynamic bodies that touch.
     islands: Islands,
-    /// Whether a struck contact belongs to the island with each root.
+    /// Whether a blow meets the island with each root.
     hit: Vec<bool>,
 }
 
@@ -40,8 +40,8 @@ impl Blows {
         holds(&self.jointed, contact)
     }
 
-    /// Marks as struck the contacts of several points whose surfaces meet, on average, faster than `threshold` (m/s),
-    /// and those that pass such a blow on.
+    /// Marks as struck the contacts of several points in islands where surfaces meet, on average, faster than `threshold`
+    /// (m/s).
     pub(super) fn note(&mut self, slots: &[Slot], world: &World, threshold: f32, problem: &StepProblem) {
         self.note_joints(world);
         let is_fast = |(row, body): (&BodyRow, &Body)| {
@@ -59,19 +59,17 @@ impl Blows {
         if !self.fast.contains(&true) {
             return;
         }
-        let mut struck = std::mem::take(&mut self.struck);
         let meets = |(slot, contact): (&Slot, &ContactRow)| {
             let is_fast = || [contact.body_a, contact.body_b].iter().any(|&body| self.fast[body as usize]);
-            let can_meet = slot.takes_part && contact.point_count > 1 && is_fast() && !self.is_jointed(contact);
-            can_meet && relative_velocity(problem, contact).dot(contact.normal.into()) < -threshold
+            slot.takes_part && is_fast() && approach(problem, contact) > threshold
         };
-        struck.extend(slots.iter().zip(&problem.contacts).map(meets));
-        if struck.contains(&true) {
-            self.pass_on(&mut struck, slots, world, threshold, problem);
-        } else {
-            struck.clear();
+        self.struck.extend(slots.iter().zip(&problem.contacts).map(meets));
+        if self.struck.contains(&true) {
+            self.pass_on(slots, world, &problem.contacts);
         }
-        self.struck = struck;
+        if !self.struck.contains(&true) {
+            self.struck.clear();
+        }
     }
 
     fn note_joints(&mut self, world: &World) {
@@ -84,31 +82,29 @@ impl Blows {
         }
     }
 
-    /// Marks the contacts of bodies that move fast and together, and to one of which a struck contact belongs. In a
-    /// column that falls flat, only the lowest contact meets at speed. Swept point by point, the others would topple it.
-    fn pass_on(&mut self, struck: &mut [bool], slots: &[Slot], world: &World, threshold: f32, problem: &StepProblem) {
-        let contacts = &problem.contacts;
-        let Self { jointed, fast, islands, hit, .. } = self;
-        let is_mover = |body: u32| fast[body as usize] && world.bodies[body as usize].kind == BodyKind::Dynamic;
-        let passes = |(slot, contact): (&Slot, &ContactRow)| {
-            let are_movers = slot.takes_part && is_mover(contact.body_a) && is_mover(contact.body_b);
-            are_movers && relative_velocity(problem, contact).length() < 0.5 * threshold
+    /// Goes from the contacts that meet at speed to all contacts of their islands, which pass the blow on. In a column
+    /// that falls flat only the lowest contact meets at speed. Swept point by point, the others would topple it.
+    fn pass_on(&mut self, slots: &[Slot], world: &World, contacts: &[ContactRow]) {
+        let Self { struck, jointed, fast, islands, hit } = self;
+        let movable = |contact: &ContactRow| {
+            let bodies = [contact.body_a, contact.body_b];
+            bodies.map(|body| (world.bodies[body as usize].kind == BodyKind::Dynamic).then_some(body))
         };
         islands.reset(fast.len());
-        for (_, contact) in slots.iter().zip(contacts).filter(|&contact| passes(contact)) {
-            islands.join(contact.body_a, contact.body_b);
+        for (_, contact) in slots.iter().zip(contacts).filter(|(slot, _)| slot.takes_part) {
+            if let [Some(a), Some(b)] = movable(contact) {
+                islands.join(a, b);
+            }
         }
         let roots = islands.roots();
         hit.clear();
         hit.resize(fast.len(), false);
-        for (contact, _) in contacts.iter().zip(&*struck).filter(|&(_, &is_struck)| is_struck) {
-            for body in [contact.body_a, contact.body_b].into_iter().filter(|&body| is_mover(body)) {
-                hit[roots[body as usize] as usize] = true;
-            }
+        for (contact, _) in contacts.iter().zip(struck.iter()).filter(|&(_, &is_struck)| is_struck) {
+            movable(contact).into_iter().flatten().for_each(|body| hit[roots[body as usize] as usize] = true);
         }
         for ((slot, contact), is_struck) in slots.iter().zip(contacts).zip(struck) {
-            let is_hit = || hit[roots[contact.body_a as usize] as usize];
-            *is_struck |= contact.point_count > 2 && passes((slot, contact)) && is_hit() && !holds(jointed, contact);
+            let is_hit = || movable(contact).into_iter().flatten().any(|body| hit[roots[body as usize] as usize]);
+            *is_struck = slot.takes_part && contact.point_count > 1 && is_hit() && !holds(jointed, contact);
         }
     }
 }
@@ -118,8 +114,8 @@ fn holds(jointed: &[bool], contact: &ContactRow) -> bool {
     [contact.body_a, contact.body_b].iter().any(|&body| jointed.get(body as usize).is_some_and(|&is_held| is_held))
 }
 
-/// The mean velocity of the surface of body b of a contact against that of body a (m/s).
-fn relative_velocity(problem: &StepProblem, contact: &ContactRow) -> Vec3 {
+/// The mean speed at which the surfaces of a contact meet (m/s).
+fn approach(problem: &StepProblem, contact: &ContactRow) -> f32 {
     let first = contact.first_point as usize;
     let points = &problem.points[first..first + contact.point_count as usize];
     let arms = points.iter().fold([Vec3::ZERO; 2], |[a, b], p| [a + Vec3::from(p.r_a), b + Vec3::from(p.r_b)]);
@@ -128,5 +124,5 @@ fn relative_velocity(problem: &StepProblem, contact: &ContactRow) -> Vec3 {
         let BodyRow { v, w, .. } = problem.bodies[body as usize];
         count * Vec3::from(v) + Vec3::from(w).cross(arms)
     });
-    (b - a) / count
+    (a - b).dot(contact.normal.into()) / count
 }
