@@ -147,7 +147,8 @@ fn without_friction_and_where_all_sticks_it_is_the_convex_program() {
         let (velocities, impulses) = convex(&problem, &vec![0.0; problem.contacts.len()]);
         let (difference, theirs) = (apart(&problem, &ours, &velocities), Residuals::of(&problem, &impulses).e_vel);
         println!("{}: {difference:.1e} apart, theirs {theirs:.1e}", problem.name);
-        assert!(difference < SAME && theirs < 1e-8, "{}: {difference:e}, {theirs:e}", problem.name);
+        // The interior point method bounds the products of gaps and impulses. Where both vanish, each is as exact as a root.
+        assert!(difference < SAME && theirs < ASKED.sqrt(), "{}: {difference:e}, {theirs:e}", problem.name);
     }
 }
 

@@ -249,6 +249,7 @@ fn motion(case: &Case, steps: usize) -> f32 {
 fn assert_apart(what: &str, case: &Case, symmetry: &Symmetry, steps: usize, most: f32) {
     let apart = apart(case, symmetry, steps);
     let (step, worst) = (1..).zip(&apart).fold((0, 0.0), |worst, (k, &d)| if d > worst.1 { (k, d) } else { worst });
+    println!("{what}: {worst:e} of {most:e} m");
     assert!(worst <= most, "{what}: {worst:e} m apart after step {step}, more than {most:e}");
     assert!(motion(case, steps) > 1e-6, "{what}: nothing moves");
 }
@@ -336,9 +337,9 @@ fn worlds_that_are_turned_moved_mirrored_and_reordered_move_accordingly() {
         ("wall:rows=4,columns=4", 300, [3e-5, 2e-5, 2.5e-4, 4e-5, 7e-5]),
         ("mass-ratio", 120, [4e-3, 2e-3, 2e-4, 4e-3, 2e-3]),
         ("chain:links=6", 60, [5e-6, 6e-6, 1.5e-4, 0.0, 0.0]),
-        ("pile:n=27", 10, [2e-6, 2e-6, 2e-5, 1.5e-3, 1e-6]),
+        ("pile:n=27", 10, [2e-6, 2e-6, 2e-5, 4.5e-4, 1e-6]),
         // At rest: boxes of a meter, some of which fell to another side of a tie.
-        ("pile:n=27", 300, [3e-4, 5e-4, 4e-4, 0.25, 0.1]),
+        ("pile:n=27", 300, [1.7e-3, 5e-4, 4e-4, 0.05, 0.08]),
         ("sphere-plane", 120, [1e-6, 1e-6, 1e-6, 0.0, 0.0]),
     ];
     for (spec, steps, [by_quarter, by_cycle, by_way, in_mirror, by_order]) in cases {
