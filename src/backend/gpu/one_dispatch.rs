@@ -65,10 +65,15 @@ pub(super) fn of(problem: &StepProblem, passes: &[Pass], target: Target) -> Opti
     Some((Program::OneDispatch(kernels.into(), threads as u32), table))
 }
 
-/// Largest number of iterations for a row of a kernel: twice over its points, or over the axes of a joint.
+/// Largest number of iterations for a row of a kernel: twice over its points, or over the axes of a joint. Points that
+/// change together take two more loops.
 fn of_row(kernel: Kernel) -> usize {
-    let sweeps = if let Kernel::SolveContacts(rules) = kernel { rules.passes.max(1) as usize } else { 1 };
-    2 + sweeps * (3 + 2 * MAX_POINTS)
+    let (sweeps, loops) = match kernel {
+        Kernel::SolveContacts(rules) => (rules.passes.max(1) as usize, if rules.as_one { 4 } else { 2 }),
+        Kernel::ApplyRestitution(_) => (1, 3),
+        _ => (1, 2),
+    };
+    2 + sweeps * (1 + loops * (1 + MAX_POINTS))
 }
 
 /// Whether threads of a kernel share only rows, so that one program can hold the kernel with others.
