@@ -214,7 +214,7 @@ fn lacking<L: Lane>(point: &Point<L>, correction: L) -> L {
 }
 
 /// Non-penetration of all points together, before each is solved alone. It changes nothing if each point is solved. If
-/// points were only swept one after another, those of a flat blow would turn the body, because the first one takes more
+/// points were only swept one after another, those of a flat impact would turn the body, because the first one takes more
 /// than its share.
 #[inline(always)]
 fn solve_as_one<L: Lane>(

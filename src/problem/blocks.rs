@@ -104,7 +104,7 @@ pub fn lay_out(
     let block_of = |body: u32| if count == 1 { 0 } else { effort.block_of(body as usize) };
     let is_dynamic = |body: u32| world.bodies.get(body as usize).is_some_and(|b| b.kind == BodyKind::Dynamic);
     let block_of_pair = |[a, b]: [u32; 2]| block_of(if is_dynamic(a) { a } else { b });
-    if count == 1 && !contacts.blows().any() && !contacts.any_jamming(rows) {
+    if count == 1 && !contacts.impacts().any() && !contacts.any_jamming(rows) {
         order.extend_from_slice(&contacts.coloring.order);
         colors.clone_from(&contacts.coloring.offsets);
         blocks[0].contacts = [0, contacts.coloring.color_count() as u32];
@@ -114,7 +114,7 @@ pub fn lay_out(
             let is_of =
                 |row: u32| count == 1 || block_of_pair([rows[row as usize].body_a, rows[row as usize].body_b]) == i;
             let jams = contacts.jams(rows);
-            let is_struck = |row: u32| contacts.blows().is_struck(row) && !jams(row);
+            let is_struck = |row: u32| contacts.impacts().is_struck(row) && !jams(row);
             let is_swept_once = |row: u32| is_of(row) && !jams(row) && !is_struck(row);
             let [first, struck] = deal_colors(&contacts.coloring, order, colors, is_swept_once);
             let [_, jamming] = deal_colors(&contacts.coloring, order, colors, |row| is_of(row) && is_struck(row));

@@ -6,9 +6,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::StepProblem;
-use super::blows::Blows;
 use super::bodies::MIN_BODIES;
 use super::carry::{Carry, NO_POINT, Preload, Written};
+use super::impacts::Impacts;
 use super::points_a_slot;
 use super::prepare::{ComputedRow, PoseRow};
 use super::rows::{ContactRow, ImpulseRow, PointRow, Substep};
@@ -40,7 +40,7 @@ pub struct ContactRows {
     /// [`EffectiveMass::jamming`](super::effective::EffectiveMass::jamming) above 1 at some point.
     jams: Vec<bool>,
     /// The contacts that are struck in this step, and those of bodies with joints.
-    blows: Blows,
+    impacts: Impacts,
     /// The classes of bodies when the rows were written.
     classes: Vec<u8>,
     /// The common facts about all materials; `None` if a material may have changed.
@@ -66,7 +66,7 @@ crate::saved::cloned!(ContactRows {
     hooked,
     sums,
     carry,
-} scratch { graph, poses, blows, new_bodies });
+} scratch { graph, poses, impacts, new_bodies });
 
 /// The rows that contacts have besides those of their points, and whether rows have slips.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -345,12 +345,12 @@ impl ContactRows {
     /// A test of whether the contact in a row jams, by its masses. A contact of a body with joints does not.
     pub fn jams<'a>(&'a self, rows: &'a [ContactRow]) -> impl Fn(u32) -> bool + 'a {
         let may_jam = self.materials.unwrap_or_default().and(&self.hooked).may_jam;
-        move |row| may_jam && self.jams[row as usize] && !self.blows.is_jointed(&rows[row as usize])
+        move |row| may_jam && self.jams[row as usize] && !self.impacts.is_jointed(&rows[row as usize])
     }
 
     /// The contacts that are struck in this step.
-    pub fn blows(&self) -> &Blows {
-        &self.blows
+    pub fn impacts(&self) -> &Impacts {
+        &self.impacts
     }
 
     /// Marks the bodies that lie still and have only new contacts, and returns whether there are any.
@@ -444,7 +444,7 @@ impl ContactRows {
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
-        self.blows.note(&self.slots.all, world, config.restitution_threshold, problem);
+        self.impacts.note(&self.slots.all, world, config.restitution_threshold, problem);
     }
 
     /// Makes room for the rows of all slots. If friction moves between points and manifolds, friction begins without

@@ -3,7 +3,6 @@
 pub(crate) mod arithmetic;
 mod axes;
 mod blocks;
-mod blows;
 mod bodies;
 pub mod carry;
 mod check;
@@ -12,6 +11,7 @@ mod contacts;
 pub(crate) mod damping;
 pub mod effective;
 mod geometric_stiffness;
+mod impacts;
 pub(crate) mod join;
 mod joint_loads;
 mod joint_sets;

@@ -76,7 +76,7 @@ impl ContactRows {
             computed,
             poses: _,
             jams,
-            blows: _,
+            impacts: _,
             classes,
             materials,
             new_bodies: _,

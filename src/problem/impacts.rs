@@ -1,4 +1,4 @@
-//! Blows: the contacts whose points are swept together, because surfaces of their island meet at speed.
+//! Impacts: the contacts whose points are swept together, because surfaces of their island meet at speed.
 
 use glam::Vec3;
 
@@ -10,7 +10,7 @@ use crate::world::{Body, BodyKind, Joint, World};
 
 /// The contacts that are struck in a step.
 #[derive(Debug, Default)]
-pub struct Blows {
+pub struct Impacts {
     /// Whether the points of each slot's contact are struck together; empty if none are.
     struck: Vec<bool>,
     /// Whether a joint holds each dynamic body; empty without joints.
@@ -19,11 +19,11 @@ pub struct Blows {
     fast: Vec<bool>,
     /// The islands of dynamic bodies that touch.
     islands: Islands,
-    /// Whether a blow meets the island with each root.
+    /// Whether an impact meets the island with each root.
     hit: Vec<bool>,
 }
 
-impl Blows {
+impl Impacts {
     /// Whether the points of any contact are struck together.
     pub fn any(&self) -> bool {
         !self.struck.is_empty()
@@ -82,7 +82,7 @@ impl Blows {
         }
     }
 
-    /// Goes from the contacts that meet at speed to all contacts of their islands, which pass the blow on. In a column
+    /// Goes from the contacts that meet at speed to all contacts of their islands, which pass the impact on. In a column
     /// that falls flat only the lowest contact meets at speed. Swept point by point, the others would topple it.
     fn pass_on(&mut self, slots: &[Slot], world: &World, contacts: &[ContactRow]) {
         let Self { struck, jointed, fast, islands, hit } = self;
