@@ -147,8 +147,8 @@ fn solve_normal<L: Lane>(
 /// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
 /// still lack. `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. The
 /// common change of all points is one impulse at their middle, and no point takes more than its share because it comes
-/// first. A point may pull after this, until it is solved alone. `wanted` has no closure, which would be compiled
-/// without SIMD instructions.
+/// first. A point may pull after this, until it is solved alone. `wanted` is an array, because a closure
+/// would be compiled without SIMD instructions.
 #[inline(always)]
 fn press_as_one<L: Lane>(
     rules: Rules,

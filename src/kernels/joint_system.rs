@@ -556,14 +556,6 @@ fn take_back<L: Lane>(
     factors: &SystemFactors<L>,
 ) {
     let first_node = systems.nodes_of(system).start;
-    let mut add = |other: usize, coupled: [L; 3]| {
-        for (k, coupled) in coupled.into_iter().enumerate() {
-            if systems.nodes[first_node + other].has_row(k) && (other, k) != (node, i) {
-                let lacking = rows.lacking(other, k);
-                rows.set_lacking(other, k, L::select(lacking, lacking + coupled * before, mask));
-            }
-        }
-    };
     for column in 0..factors.nodes.len() {
         let blocks = systems.blocks_of(first_node + column);
         for at in blocks.clone() {
@@ -574,11 +566,18 @@ fn take_back<L: Lane>(
             }
             let shared = if at == blocks.start { OWN_SIDES } else { block.shared };
             let coupling = factors.nodes[column].coupling(&factors.nodes[row], shared);
-            if column == node {
+            // A closure in place of this loop would be compiled without SIMD instructions.
+            let (other, coupled) = if column == node {
                 let Vec3 { x, y, z } = coupling.column(i);
-                add(row, [x, y, z]);
+                (row, [x, y, z])
             } else {
-                add(column, [0, 1, 2].map(|k| coupling.0[k][i]));
+                (column, [0, 1, 2].map(|k| coupling.0[k][i]))
+            };
+            for (k, coupled) in coupled.into_iter().enumerate() {
+                if systems.nodes[first_node + other].has_row(k) && (other, k) != (node, i) {
+                    let lacking = rows.lacking(other, k);
+                    rows.set_lacking(other, k, L::select(lacking, lacking + coupled * before, mask));
+                }
             }
         }
     }

@@ -13,7 +13,7 @@ use crate::world::{Body, BodyKind, Joint, World};
 pub struct Impacts {
     /// Whether the points of each slot's contact are struck together; empty if none are.
     struck: Vec<bool>,
-    /// Whether a joint holds each dynamic body; empty without joints.
+    /// Whether a joint holds each dynamic body; empty without joints. Out of date where no body is fast and none may jam.
     jointed: Vec<bool>,
     /// Whether any part of each body may be faster than half the threshold of restitution.
     fast: Vec<bool>,
@@ -41,9 +41,14 @@ impl Impacts {
     }
 
     /// Marks as struck the contacts of several points in islands where surfaces meet, on average, faster than `threshold`
-    /// (m/s).
-    pub(super) fn note(&mut self, slots: &[Slot], world: &World, threshold: f32, problem: &StepProblem) {
-        self.note_joints(world);
+    /// (m/s). Joints are noted if any body is fast or any contact `may_jam`.
+    pub(super) fn note(
+        &mut self,
+        slots: &[Slot],
+        world: &World,
+        (threshold, may_jam): (f32, bool),
+        problem: &StepProblem,
+    ) {
         let is_fast = |(row, body): (&BodyRow, &Body)| {
             let [v, w] = [row.v, row.w].map(Vec3::from);
             // No point of a solid is much farther out than three radii of gyration. A driven body may have no mass.
@@ -56,7 +61,11 @@ impl Impacts {
         self.struck.clear();
         self.fast.clear();
         self.fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
-        if !self.fast.contains(&true) {
+        let any_fast = self.fast.contains(&true);
+        if any_fast || may_jam {
+            self.note_joints(world);
+        }
+        if !any_fast {
             return;
         }
         let meets = |(slot, contact): (&Slot, &ContactRow)| {

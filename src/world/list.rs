@@ -1,4 +1,4 @@
-//! What the lists of bodies and of joints have in common.
+//! The access to elements that the lists of bodies and of joints share.
 
 /// Makes a list usable as a slice. A handle names an element as an index does.
 macro_rules! list {

@@ -60,10 +60,13 @@ fn a_plate_bounces_flat() {
     }
 }
 
-/// The largest distance `aside` (m) and the largest turn (rad) of a body after some steps.
+/// The largest distance `aside` (m) and the largest turn (rad) of a body after some steps. Something has to move.
 fn away(world: World, steps: u32, aside: fn(Vec3) -> f32) -> [f32; 2] {
+    let from: Vec<Vec3> = world.dynamic().map(|body| body.position).collect();
     let mut simulation = started(world);
     (0..steps).for_each(|_| drop(simulation.step(DT).expect("a step")));
+    let moved = simulation.world.dynamic().zip(from).map(|(body, from)| body.position.distance(from));
+    assert!(moved.fold(0.0, f32::max) > 0.3, "nothing moves");
     let most = |value: &dyn Fn(&Body) -> f32| simulation.world.dynamic().map(value).fold(0.0, f32::max);
     [most(&|body| aside(body.position)), most(&|body| 2.0 * body.rotation.xyz().length())]
 }

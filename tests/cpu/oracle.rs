@@ -119,7 +119,7 @@ fn pile() -> ContactProblem {
     let scene = Scene::find("pile", &["n=6".into()]).expect("a scene of the catalogue");
     let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(Cpu::new()))
         .expect("it is sound");
-    for _ in 0..30 {
+    for _ in 0..28 {
         simulation.step(1.0 / 60.0).expect("a step");
     }
     drystone_problems::step_with_contacts(&mut simulation, "pile", 1.0 / 60.0).expect("no joints").0
@@ -147,8 +147,7 @@ fn without_friction_and_where_all_sticks_it_is_the_convex_program() {
         let (velocities, impulses) = convex(&problem, &vec![0.0; problem.contacts.len()]);
         let (difference, theirs) = (apart(&problem, &ours, &velocities), Residuals::of(&problem, &impulses).e_vel);
         println!("{}: {difference:.1e} apart, theirs {theirs:.1e}", problem.name);
-        // The interior point method bounds the products of gaps and impulses. Where both vanish, each is as exact as a root.
-        assert!(difference < SAME && theirs < ASKED.sqrt(), "{}: {difference:e}, {theirs:e}", problem.name);
+        assert!(difference < SAME && theirs < 1e-8, "{}: {difference:e}, {theirs:e}", problem.name);
     }
 }
 
