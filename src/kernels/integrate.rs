@@ -133,8 +133,8 @@ fn newton_step<L: Lane>(inertia: &Inertia<L>, h: L, m: Vec3<L>, change: Vec3<L>)
 /// `from_start` the unknown is the change itself, because a short substep changes a spin by about as much as its
 /// rounding error.
 #[inline(always)]
-fn spin_change<S: Scalar>(from_start: bool, steps: u32, inertia: &Inertia<S>, h: S, spin: Vec3<S>) -> Vec3<S> {
-    let half = S::constant(0.5);
+fn spin_change<L: Lane>(from_start: bool, steps: u32, inertia: &Inertia<L>, h: L, spin: Vec3<L>) -> Vec3<L> {
+    let half = L::constant(0.5);
     if from_start {
         let mut change = Vec3::default();
         for _ in 0..steps {
@@ -199,38 +199,84 @@ pub fn integrate_gyroscopic<S: Scalar>(
     body: &mut Body<S>,
     free: &mut Free<S>,
 ) {
-    let (zero, one) = (S::constant(0.0), S::constant(1.0));
-    let (p, k) = (inertia.principal, inertia.inv_principal);
-
-    // The present principal axes.
-    let q = quat_mul(body.dq, inertia.frame);
-    let (unit_x, unit_y, unit_z) = (vec3(one, zero, zero), vec3(zero, one, zero), vec3(zero, zero, one));
-    let x = turned(q, unit_x) + unit_x;
-    let y = turned(q, unit_y) + unit_y;
-    let z = turned(q, unit_z) + unit_z;
-
-    // The free spin. Impulses come later.
-    let w = if from_start { free.w + body.w } else { free.w };
-    let spin = vec3(dot3(x, w), dot3(y, w), dot3(z, w));
-
-    // (h W)²
-    let a = vec3((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
-    let rates = vec3(a.y * a.z, a.z * a.x, a.x * a.y);
-    let sizes = vec3(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
-    let angle = spin * params.substep;
-    let square = dot3(sizes, angle * angle);
-
-    let turn = if S::constant(SLOW) > square {
-        // Only the change is turned back. Otherwise rounding of the axes would stretch a spin that nothing changes.
-        let change = spin_change(from_start, 2, inertia, params.substep, spin);
-        x * change.x + y * change.y + z * change.z
+    let motion = PrincipalMotion::of(from_start, params, inertia, body, free);
+    let turn = if S::any(motion.is_slow()) {
+        motion.slow_turn(from_start, params, inertia)
     } else {
-        fast_turn(from_start, inertia, params.substep, square, [x, y, z], spin, w)
+        let PrincipalMotion { axes, w, spin, square } = motion;
+        fast_turn(from_start, inertia, params.substep, square, axes, spin, w)
     };
+    add_turn(from_start, turn, body, free);
+}
+
+/// The same for bodies that spin slowly. Returns which do; the others get no valid spin.
+#[inline(always)]
+pub fn integrate_slow_gyroscopic<L: Lane>(
+    from_start: bool,
+    params: &StepParams<L>,
+    inertia: &Inertia<L>,
+    body: &mut Body<L>,
+    free: &mut Free<L>,
+) -> L::Mask {
+    let motion = PrincipalMotion::of(from_start, params, inertia, body, free);
+    add_turn(from_start, motion.slow_turn(from_start, params, inertia), body, free);
+    motion.is_slow()
+}
+
+/// Adds the change of an angular velocity.
+#[inline(always)]
+fn add_turn<L: Lane>(from_start: bool, turn: Vec3<L>, body: &mut Body<L>, free: &mut Free<L>) {
     if !from_start {
         free.w += turn;
     }
     body.w += turn;
+}
+
+/// The motion of a body about its principal axes.
+struct PrincipalMotion<L> {
+    /// The present axes.
+    axes: [Vec3<L>; 3],
+    /// The free angular velocity. Impulses come later.
+    w: Vec3<L>,
+    /// The same, about the axes.
+    spin: Vec3<L>,
+    /// (h W)²
+    square: L,
+}
+
+impl<L: Lane> PrincipalMotion<L> {
+    #[inline(always)]
+    fn of(from_start: bool, params: &StepParams<L>, inertia: &Inertia<L>, body: &Body<L>, free: &Free<L>) -> Self {
+        let (zero, one) = (L::constant(0.0), L::constant(1.0));
+        let (p, k) = (inertia.principal, inertia.inv_principal);
+        let q = quat_mul(body.dq, inertia.frame);
+        let (unit_x, unit_y, unit_z) = (vec3(one, zero, zero), vec3(zero, one, zero), vec3(zero, zero, one));
+        let x = turned(q, unit_x) + unit_x;
+        let y = turned(q, unit_y) + unit_y;
+        let z = turned(q, unit_z) + unit_z;
+        let w = if from_start { free.w + body.w } else { free.w };
+        let spin = vec3(dot3(x, w), dot3(y, w), dot3(z, w));
+        let a = vec3((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
+        let rates = vec3(a.y * a.z, a.z * a.x, a.x * a.y);
+        let sizes = vec3(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
+        let angle = spin * params.substep;
+        Self { axes: [x, y, z], w, spin, square: dot3(sizes, angle * angle) }
+    }
+
+    /// Whether two Newton steps suffice; false for NaN.
+    #[inline(always)]
+    fn is_slow(&self) -> L::Mask {
+        L::constant(SLOW).gt(self.square)
+    }
+
+    /// The change of the angular velocity of a slow spin. Only the change is turned back. Otherwise rounding of the axes
+    /// would stretch a spin that nothing changes.
+    #[inline(always)]
+    fn slow_turn(&self, from_start: bool, params: &StepParams<L>, inertia: &Inertia<L>) -> Vec3<L> {
+        let [x, y, z] = self.axes;
+        let change = spin_change(from_start, 2, inertia, params.substep, self.spin);
+        x * change.x + y * change.y + z * change.z
+    }
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@
 use std::ops::Range;
 
 use crate::kernels::integrate::{
-    begin_changes, damp_velocities, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque,
-    integrate_velocities, start_of,
+    begin_changes, damp_velocities, end_changes, integrate_gyroscopic, integrate_positions, integrate_slow_gyroscopic,
+    integrate_torque, integrate_velocities, start_of,
 };
 use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
@@ -14,7 +14,7 @@ use crate::kernels::{Body, Damping, Free, Inertia, Mass, StepParams, Sym3};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Work, lanes};
 use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
-use crate::problem::{BodyRow, Params, StepProblem, Substep, TorqueRow};
+use crate::problem::{BodyRow, InertiaRow, Params, StepProblem, Substep, TorqueRow};
 
 /// The state of a body, and its mass in sweeps.
 #[derive(Clone, Copy, Default)]
@@ -210,20 +210,87 @@ impl Work for TurningWork<'_> {
     }
 }
 
-/// Rotates the spins of some bodies with unequal moments of inertia. The list has their slots.
-pub(super) fn integrate_spins(
-    from_start: bool,
-    (params, substep): (&Params, &Substep),
-    inertias: &[(usize, Inertia<f32>)],
-    bodies: &Shared<State>,
-    free: &Shared<Row8>,
-) {
-    let params = StepParams::load(params, substep);
-    for (slot, inertia) in inertias {
-        // SAFETY: one task has all spins of a part, and `Partition::give_slots` gives each part slots of its own.
-        let (state, row) = unsafe { (&mut bodies.slice(*slot..slot + 1)[0], &mut free.slice(*slot..slot + 1)[0]) };
+/// The principal inertia of a body with unequal moments: moments . their inverses . frame, then zeros.
+pub(super) fn spin_rows(row: &InertiaRow) -> [Row8; 2] {
+    let InertiaRow { principal: [x, y, z], inv_principal: [inv_x, inv_y, inv_z], frame, .. } = *row;
+    let [qx, qy, qz, qw] = frame;
+    [Row8([x, y, z, 0.0, inv_x, inv_y, inv_z, 0.0]), Row8([qx, qy, qz, qw, 0.0, 0.0, 0.0, 0.0])]
+}
+
+/// Changes the spins of some bodies with unequal moments of inertia. The list has their slots and [`spin_rows`].
+pub(super) struct SpinWork<'a> {
+    pub from_start: bool,
+    pub params: &'a Params,
+    pub substep: &'a Substep,
+    pub rows: &'a [(u32, [Row8; 2])],
+    pub bodies: Shared<'a, State>,
+    pub free: Shared<'a, Row8>,
+}
+
+impl Work for SpinWork<'_> {
+    #[inline(always)]
+    fn over<L: Lanes>(&self, groups: Range<usize>) {
+        let params = StepParams::<L>::load(self.params, self.substep);
+        for group in groups {
+            let rows = &self.rows[WIDTH * group..self.rows.len().min(WIDTH * (group + 1))];
+            let mut places = [place(rows[0].0 as usize); WIDTH];
+            let mut addresses = [rows[0].1.as_ptr(); WIDTH];
+            for ((place_of, address), (slot, row)) in places.iter_mut().zip(&mut addresses).zip(rows) {
+                (*place_of, *address) = (place(*slot as usize), row.as_ptr());
+            }
+            // SAFETY: the places are those of states that no other task has, and each state has a row of `free`. Two
+            // rows are at each of the addresses.
+            let (mut body, mut free, [px, py, pz, _, kx, ky, kz, _], [qx, qy, qz, qw, ..]) = unsafe {
+                (
+                    wide_body::<L>(self.bodies.as_ptr(), &places),
+                    wide_free::<L>(self.free.as_ptr(), &places),
+                    L::columns(&lanes!(lane => addresses[lane].cast())),
+                    L::columns(&lanes!(lane => addresses[lane].add(1).cast())),
+                )
+            };
+            let inertia = Inertia {
+                principal: vec3(px, py, pz),
+                inv_principal: vec3(kx, ky, kz),
+                frame: Quat { axis: vec3(qx, qy, qz), w: qw },
+            };
+            let is_slow = integrate_slow_gyroscopic(self.from_start, &params, &inertia, &mut body, &mut free);
+            let is_slow = L::select(L::constant(0.0), L::constant(1.0), is_slow).store();
+            let (velocities, free) = (velocity_rows(body.v, body.w), velocity_rows(free.v, free.w));
+            for (lane, (slot, row)) in rows.iter().enumerate() {
+                if is_slow.0[lane] > 0.0 {
+                    let slot = *slot as usize;
+                    // SAFETY: as above.
+                    unsafe {
+                        self.bodies.slice(slot..slot + 1)[0].velocity = velocities[lane];
+                        self.free.slice(slot..slot + 1)[0] = free[lane];
+                    }
+                } else {
+                    self.integrate_fast(*slot as usize, row);
+                }
+            }
+        }
+    }
+}
+
+impl SpinWork<'_> {
+    /// Changes the spin of a fast body.
+    #[cold]
+    #[inline(never)]
+    fn integrate_fast(&self, slot: usize, [moments, frame]: &[Row8; 2]) {
+        let Free { v: principal, w: inv_principal } = free_body(moments.0);
+        let [x, y, z, w, ..] = frame.0;
+        let inertia = Inertia { principal, inv_principal, frame: Quat { axis: vec3(x, y, z), w } };
+        // SAFETY: `Work::over` has this slot to itself.
+        let (state, row) =
+            unsafe { (&mut self.bodies.slice(slot..slot + 1)[0], &mut self.free.slice(slot..slot + 1)[0]) };
         let (mut body, mut free) = (state.load(), free_body(row.0));
-        integrate_gyroscopic(from_start, &params, inertia, &mut body, &mut free);
+        integrate_gyroscopic(
+            self.from_start,
+            &StepParams::load(self.params, self.substep),
+            &inertia,
+            &mut body,
+            &mut free,
+        );
         state.velocity = Row8(velocity_numbers(body.v, body.w));
         *row = Row8(velocity_numbers(free.v, free.w));
     }
@@ -287,9 +354,19 @@ pub(super) unsafe fn wide_mass<L: Lanes>(states: *const State, places: &[u32; WI
 /// Those of [`wide_body`], and `free` has a row for each state.
 #[inline(always)]
 pub(super) unsafe fn wide_start<L: Lanes>(free: *const Row8, places: &[u32; WIDTH], mass: &Mass<L>) -> Free<L> {
+    // SAFETY: the caller's promise.
+    start_of(mass, &unsafe { wide_free(free, places) })
+}
+
+/// The rows of `free` of sixteen bodies at the places of their states.
+///
+/// # Safety
+/// Those of [`wide_body`], and `free` has a row for each state.
+#[inline(always)]
+unsafe fn wide_free<L: Lanes>(free: *const Row8, places: &[u32; WIDTH]) -> Free<L> {
     const ROWS: u32 = (size_of::<State>() / size_of::<Row8>()) as u32;
     // SAFETY: the caller's promise.
-    start_of(mass, &free_body(unsafe { L::gathered(free, &places.map(|place| place / ROWS)) }))
+    free_body(unsafe { L::gathered(free, &lanes!(lane => places[lane] / ROWS)) })
 }
 
 #[inline(always)]

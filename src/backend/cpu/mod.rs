@@ -30,13 +30,13 @@ use std::sync::atomic::AtomicBool;
 
 use super::{Backend, CheckedStep};
 use crate::error::Result;
+use crate::kernels::Momentum;
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::momentum::{StepLength, chunked_sum};
-use crate::kernels::{Inertia, Momentum};
 use crate::lanes::{InstructionSet, Row8, Shared, WIDTH};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ContactRow, ConvergenceRow, JointRow, MassRow, StepProblem};
-use bodies::{State, extrapolate_velocities, load_bodies, place, store_bodies};
+use bodies::{State, extrapolate_velocities, load_bodies, place, spin_rows, store_bodies};
 use joint_systems::{SharedFactors, SystemLayout, SystemsFactors};
 use lane_layout::{LaneLayout, Uses};
 use lane_rows::{LaneImpulses, LanePoints};
@@ -63,8 +63,8 @@ pub struct Cpu {
     accelerations: Vec<Row8>,
     /// Rows of damping; empty if no body is damped.
     dampings: Vec<Row8>,
-    /// Unequal moments of inertia, and the slots of their bodies, in the order of slots.
-    inertias: Vec<(usize, Inertia<f32>)>,
+    /// Unequal moments of inertia, in the order of slots.
+    inertias: Vec<(u32, [Row8; 2])>,
     contacts: LaneLayout<ContactRow>,
     contact_points: LanePoints,
     contact_impulses: LaneImpulses,
@@ -122,8 +122,7 @@ impl Cpu {
             }
         }
         self.inertias.clear();
-        self.inertias
-            .extend(problem.inertias.iter().map(|row| (slots[row.body as usize] as usize, Inertia::load(row))));
+        self.inertias.extend(problem.inertias.iter().map(|row| (slots[row.body as usize], spin_rows(row))));
         self.inertias.sort_unstable_by_key(|inertia| inertia.0);
         self.places.clear();
         self.places.extend(slots.iter().enumerate().map(|(body, &slot)| {

@@ -4,14 +4,13 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use super::bodies::{BodyWork, State, TurningWork, integrate_spins};
+use super::bodies::{BodyWork, SpinWork, State, TurningWork};
 use super::constraint::Constraint;
 use super::joint_systems::{SharedFactors, SystemLayout, SystemWork};
 use super::lane_layout::LaneLayout;
 use super::lane_rows::{SharedImpulses, SharedPoints};
 use super::partition::Partition;
 use super::sweep::{Sums, Sweep, clear_impulses};
-use crate::kernels::Inertia;
 use crate::lanes::{InstructionSet, Row8, Shared, WIDTH};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{Block, ContactRow, JointRow, Params, StepProblem};
@@ -26,7 +25,7 @@ pub(super) struct SharedStep<'a> {
     pub free: Shared<'a, Row8>,
     pub accelerations: &'a [Row8],
     pub dampings: &'a [Row8],
-    pub inertias: &'a [(usize, Inertia<f32>)],
+    pub inertias: &'a [(u32, [Row8; 2])],
     pub contacts: &'a LaneLayout<ContactRow>,
     pub contact_points: SharedPoints<'a>,
     pub contact_impulses: SharedImpulses<'a>,
@@ -64,9 +63,9 @@ impl SharedStep<'_> {
                 spread(self.partition.bodies(part), &|range| self.instructions.run(&work, range));
             }
             Kernel::IntegrateGyroscopic { from_start } => {
-                let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
-                let [first, end] = [slots.start, slots.end].map(|slot| self.inertias.partition_point(|i| i.0 < slot));
-                integrate_spins(from_start, (params, substep), &self.inertias[first..end], &bodies, &self.free);
+                let rows = self.of_part(self.inertias, part);
+                let work = SpinWork { from_start, params, substep, rows, bodies, free: self.free };
+                spread(0..rows.len().div_ceil(WIDTH), &|range| self.instructions.run(&work, range));
             }
             Kernel::ClearImpulses => {
                 for color in pass.colors.clone() {
@@ -97,11 +96,9 @@ impl SharedStep<'_> {
                 self.sweep::<_, false>(pass, part, self.joints, (self.joint_axes, self.joint_changes), spread);
             }
             Kernel::TurnInertias => {
-                let slots = self.partition.bodies(part).start * WIDTH..self.partition.bodies(part).end * WIDTH;
-                let [first, end] =
-                    [slots.start, slots.end].map(|slot| self.turning.partition_point(|row| (row.0 as usize) < slot));
-                let work = TurningWork { rows: &self.turning[first..end], bodies };
-                spread(0..(end - first).div_ceil(WIDTH), &|range| self.instructions.run(&work, range));
+                let rows = self.of_part(self.turning, part);
+                let work = TurningWork { rows, bodies };
+                spread(0..rows.len().div_ceil(WIDTH), &|range| self.instructions.run(&work, range));
             }
             Kernel::BeginSystems | Kernel::SolveJointSystems(_) => {
                 let work = SystemWork {
@@ -122,6 +119,13 @@ impl SharedStep<'_> {
                 unreachable!("{kernel} does not stay on islands")
             }
         }
+    }
+
+    /// The rows of the bodies of a part. `rows` has the slots of all bodies with such a row, in ascending order.
+    fn of_part<'a, T>(&self, rows: &'a [(u32, T)], part: usize) -> &'a [(u32, T)] {
+        let Range { start, end } = self.partition.bodies(part);
+        let [first, end] = [start, end].map(|group| rows.partition_point(|row| (row.0 as usize) < group * WIDTH));
+        &rows[first..end]
     }
 
     fn sum<C: Constraint>(&self, pass: &Pass, part: usize, layout: &LaneLayout<C>, sums: &Sums, spread: Spread) {
