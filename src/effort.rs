@@ -6,7 +6,7 @@
 //! class is the lowest that keeps the promise. The same number decides whether tall and uneven structures stand,
 //! because a tower sways if the springs of its contacts are soft for their load.
 //!
-//! A class rises as soon as a load lasts. It falls only after a second in which the next lower class would have kept
+//! A class rises as soon as a load lasts. It falls only after thirty steps in which the next lower class would have kept
 //! half of the promise, so a constant load never changes a class. Impulses and preloads scale by powers of two, without
 //! rounding.
 //!

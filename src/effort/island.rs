@@ -95,17 +95,17 @@ mod tests {
     }
 
     #[test]
-    fn a_class_rises_at_once_and_falls_after_a_second_of_calm() {
+    fn a_class_rises_at_once_and_falls_after_half_a_second_of_calm() {
         assert_eq!(next(island(20.0, 0, 0), 3), (3, 0));
         assert_eq!(next(island(1e9, 0, 0), 3), (3, 0), "no higher than the settings allow");
         assert_eq!(next(island(80.0, 5, 0), 3).0, 3, "as high as the settings allow now");
         assert_eq!(next(island(0.0, 5, 0), 3), (3, 1), "and no lower at once");
-        assert_eq!(next(island(2.1, 2, 30), 3), (2, 0), "class 1 would be near its limit");
-        assert_eq!(next(island(1.9, 2, 30), 3), (2, 31));
-        assert_eq!(next(island(1.9, 2, 59), 3), (1, 0));
+        assert_eq!(next(island(2.1, 2, 10), 3), (2, 0), "class 1 would be near its limit");
+        assert_eq!(next(island(1.9, 2, 10), 3), (2, 11));
+        assert_eq!(next(island(1.9, 2, 29), 3), (1, 0));
         assert_eq!(next(island(0.0, 0, 9), 3), (0, 0));
         assert_eq!(next(island(0.0, 7, 0), 7), (7, 16));
-        assert_eq!([43, 44].map(|descent_steps| next(island(0.0, 7, descent_steps), 7)), [(7, 59), (6, 0)]);
+        assert_eq!([13, 14].map(|descent_steps| next(island(0.0, 7, descent_steps), 7)), [(7, 29), (6, 0)]);
     }
 
     #[test]

@@ -88,7 +88,7 @@ impl RunReport {
         let [max, p95, mean] = [self.penetration_max, self.penetration_p95, self.penetration_mean].map(|x| x * 1e3);
         row("penetration", format!("{max:.3} mm deepest, 95 % within {p95:.3}, mean {mean:.3}"));
         let (rms, most) = (self.speed_rms * 1e3, self.speed_max * 1e3);
-        let speed = |body| format!("{rms:.3} mm/s rms, {most:.3} mm/s fastest (body {body})");
+        let speed = |body| format!("{rms:.3} mm/s rms with rotation; fastest center {most:.3} mm/s (body {body})");
         row("speed", self.fastest.as_ref().map_or("0 mm/s: nothing moves".into(), speed));
         row("energy", format!("{:.3e} J kinetic, {:.3e} J gained in all", self.kinetic_energy, self.energy_gained));
         if let Some(escaped) = self.escaped {
