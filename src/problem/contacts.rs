@@ -444,7 +444,7 @@ impl ContactRows {
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
-        self.impacts.note(&self.slots.all, world, (config.restitution_threshold, may_jam), problem);
+        self.impacts.note(&self.slots.all, world, config.restitution_threshold, may_jam, problem);
     }
 
     /// Makes room for the rows of all slots. If friction moves between points and manifolds, friction begins without

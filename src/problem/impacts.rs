@@ -13,7 +13,8 @@ use crate::world::{Body, BodyKind, Joint, World};
 pub struct Impacts {
     /// Whether the points of each slot's contact are struck together; empty if none are.
     struck: Vec<bool>,
-    /// Whether a joint holds each dynamic body; empty without joints. Out of date where no body is fast and none may jam.
+    /// Whether a joint holds each dynamic body; empty without joints, and while no body is fast and no contact
+    /// may jam.
     jointed: Vec<bool>,
     /// Whether any part of each body may be faster than half the threshold of restitution.
     fast: Vec<bool>,
@@ -42,13 +43,7 @@ impl Impacts {
 
     /// Marks as struck the contacts of several points in islands where surfaces meet, on average, faster than `threshold`
     /// (m/s). Joints are noted if any body is fast or any contact `may_jam`.
-    pub(super) fn note(
-        &mut self,
-        slots: &[Slot],
-        world: &World,
-        (threshold, may_jam): (f32, bool),
-        problem: &StepProblem,
-    ) {
+    pub(super) fn note(&mut self, slots: &[Slot], world: &World, threshold: f32, may_jam: bool, problem: &StepProblem) {
         let is_fast = |(row, body): (&BodyRow, &Body)| {
             let [v, w] = [row.v, row.w].map(Vec3::from);
             // No point of a solid is much farther out than three radii of gyration. A driven body may have no mass.
@@ -62,6 +57,7 @@ impl Impacts {
         self.fast.clear();
         self.fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
         let any_fast = self.fast.contains(&true);
+        self.jointed.clear();
         if any_fast || may_jam {
             self.note_joints(world);
         }
@@ -82,7 +78,6 @@ impl Impacts {
     }
 
     fn note_joints(&mut self, world: &World) {
-        self.jointed.clear();
         for (a, b) in world.joints.iter().filter(|joint| !joint.holds_nothing()).map(Joint::indices) {
             self.jointed.resize(world.bodies.len(), false);
             for body in [Some(a), b].into_iter().flatten() {

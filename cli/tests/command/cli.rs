@@ -420,7 +420,8 @@ fn a_run_that_fell_asleep_reports_the_step_and_the_time_before() {
     let awake = folder.json("run tower -p n=3 --steps 60 --no-sleep --json");
     assert_eq!((&awake["awake_steps"], &awake["first_asleep_step"]), (&60.into(), &Value::Null));
     assert_eq!((&awake["manifolds"], &awake["points"]), (&3.into(), &12.into()));
-    assert!(folder.output("run throw --steps 10 --no-sleep").contains("fastest center "));
+    let moving = folder.output("run throw --steps 10 --no-sleep");
+    assert!(moving.contains("fastest center ") && moving.contains("mm/s (body "), "{moving}");
 }
 
 /// Vulkan's loader loads libwayland, which prints an error without a desktop.

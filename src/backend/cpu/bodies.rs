@@ -178,6 +178,19 @@ impl Work for BodyWork<'_> {
     }
 }
 
+/// Up to sixteen rows of a list with the slots of their bodies: the places of the states and the addresses of the rows.
+/// The last group repeats its first row.
+#[inline(always)]
+fn group_of<T>(rows: &[(u32, T)], group: usize) -> (&[(u32, T)], [u32; WIDTH], [*const T; WIDTH]) {
+    let rows = &rows[WIDTH * group..rows.len().min(WIDTH * (group + 1))];
+    let mut places = [place(rows[0].0 as usize); WIDTH];
+    let mut addresses = [&raw const rows[0].1; WIDTH];
+    for ((place_of, address), (slot, row)) in places.iter_mut().zip(&mut addresses).zip(rows) {
+        (*place_of, *address) = (place(*slot as usize), row);
+    }
+    (rows, places, addresses)
+}
+
 /// Rotates the inertia of some bodies in systems of joints. The list has their slots, and their inertia at the start of
 /// the step.
 pub(super) struct TurningWork<'a> {
@@ -189,16 +202,10 @@ impl Work for TurningWork<'_> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         for group in groups {
-            let rows = &self.rows[WIDTH * group..self.rows.len().min(WIDTH * (group + 1))];
-            let mut begin = [Row8::default(); WIDTH];
-            let mut places = [place(rows[0].0 as usize); WIDTH];
-            for ((begin, place_of), (slot, row)) in begin.iter_mut().zip(&mut places).zip(rows) {
-                (*begin, *place_of) = (*row, place(*slot as usize));
-            }
-            // SAFETY: the places are those of states that no other task has; `NEIGHBORING_ROWS` are the places of the
-            // rows.
+            let (rows, places, begin) = group_of(self.rows, group);
+            // SAFETY: the places are those of states that no other task has. A row is at each of the addresses.
             let (body, [xx, xy, xz, inv_mass, yy, yz, zz, zero]) = unsafe {
-                (wide_body::<L>(self.bodies.as_ptr(), &places), L::gathered(begin.as_ptr(), &NEIGHBORING_ROWS))
+                (wide_body::<L>(self.bodies.as_ptr(), &places), L::columns(&lanes!(lane => begin[lane].cast())))
             };
             let Sym3 { x, yz } = turned_inertia(Sym3 { x: vec3(xx, xy, xz), yz: vec3(yy, yz, zz) }, body.dq);
             let turned = L::scattered([x.x, x.y, x.z, inv_mass, yz.x, yz.y, yz.z, zero]);
@@ -217,6 +224,13 @@ pub(super) fn spin_rows(row: &InertiaRow) -> [Row8; 2] {
     [Row8([x, y, z, 0.0, inv_x, inv_y, inv_z, 0.0]), Row8([qx, qy, qz, qw, 0.0, 0.0, 0.0, 0.0])]
 }
 
+/// The inertia of a kernel from the numbers of [`spin_rows`].
+#[inline(always)]
+fn inertia<L>([px, py, pz, _, kx, ky, kz, _]: [L; 8], [qx, qy, qz, qw, ..]: [L; 8]) -> Inertia<L> {
+    let frame = Quat { axis: vec3(qx, qy, qz), w: qw };
+    Inertia { principal: vec3(px, py, pz), inv_principal: vec3(kx, ky, kz), frame }
+}
+
 /// Changes the spins of some bodies with unequal moments of inertia. The list has their slots and [`spin_rows`].
 pub(super) struct SpinWork<'a> {
     pub from_start: bool,
@@ -232,27 +246,18 @@ impl Work for SpinWork<'_> {
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         let params = StepParams::<L>::load(self.params, self.substep);
         for group in groups {
-            let rows = &self.rows[WIDTH * group..self.rows.len().min(WIDTH * (group + 1))];
-            let mut places = [place(rows[0].0 as usize); WIDTH];
-            let mut addresses = [rows[0].1.as_ptr(); WIDTH];
-            for ((place_of, address), (slot, row)) in places.iter_mut().zip(&mut addresses).zip(rows) {
-                (*place_of, *address) = (place(*slot as usize), row.as_ptr());
-            }
+            let (rows, places, addresses) = group_of(self.rows, group);
             // SAFETY: the places are those of states that no other task has, and each state has a row of `free`. Two
             // rows are at each of the addresses.
-            let (mut body, mut free, [px, py, pz, _, kx, ky, kz, _], [qx, qy, qz, qw, ..]) = unsafe {
+            let (mut body, mut free, moments, frame) = unsafe {
                 (
                     wide_body::<L>(self.bodies.as_ptr(), &places),
                     wide_free::<L>(self.free.as_ptr(), &places),
                     L::columns(&lanes!(lane => addresses[lane].cast())),
-                    L::columns(&lanes!(lane => addresses[lane].add(1).cast())),
+                    L::columns(&lanes!(lane => addresses[lane].cast::<Row8>().add(1).cast())),
                 )
             };
-            let inertia = Inertia {
-                principal: vec3(px, py, pz),
-                inv_principal: vec3(kx, ky, kz),
-                frame: Quat { axis: vec3(qx, qy, qz), w: qw },
-            };
+            let inertia = inertia(moments, frame);
             let is_slow = integrate_slow_gyroscopic(self.from_start, &params, &inertia, &mut body, &mut free);
             let is_slow = L::select(L::constant(0.0), L::constant(1.0), is_slow).store();
             let (velocities, free) = (velocity_rows(body.v, body.w), velocity_rows(free.v, free.w));
@@ -277,9 +282,7 @@ impl SpinWork<'_> {
     #[cold]
     #[inline(never)]
     fn integrate_fast(&self, slot: usize, [moments, frame]: &[Row8; 2]) {
-        let Free { v: principal, w: inv_principal } = free_body(moments.0);
-        let [x, y, z, w, ..] = frame.0;
-        let inertia = Inertia { principal, inv_principal, frame: Quat { axis: vec3(x, y, z), w } };
+        let inertia = inertia(moments.0, frame.0);
         // SAFETY: `Work::over` has this slot to itself.
         let (state, row) =
             unsafe { (&mut self.bodies.slice(slot..slot + 1)[0], &mut self.free.slice(slot..slot + 1)[0]) };
