@@ -69,6 +69,9 @@ pub const STIFFEST: f32 = 0.5;
 pub const SWING_LIMIT: f64 = 3.0;
 /// The factor by which a joint of a swinging net may open further in the next step.
 pub const GROWTH: f32 = 2.5;
+/// The largest turn of a body against another in a step for which the angles of their joint keep the directions that
+/// they have when the step begins (rad). The angles are then off by half of its square.
+pub const SLOW_TURN: f32 = 0.02;
 /// Most products of blocks for each node of a system of joints. A chain of balls has 1, a ring 3, and a ladder with two
 /// joints at each seam 6. A sheet of 16 x 16 balls has 100, where more substeps are cheaper.
 pub const MAX_TERMS_A_NODE: usize = 24;

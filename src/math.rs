@@ -7,6 +7,7 @@
 //! Functions are `#[inline(always)]` and use no closures: a helper that is not inlined loses the instruction set of its
 //! caller.
 
+pub mod angles;
 mod movement;
 pub mod rotation;
 

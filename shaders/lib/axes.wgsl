@@ -9,6 +9,30 @@ fn relative_turn(pair: ptr<function, Pair>) -> vec3f {
     return half * (2.0 + dot3(half, half) * (1.0 / 3.0));
 }
 
+struct AngleMotion { about: vec3f, moved: f32 }
+
+// The axis of an angle between the frames on both bodies, and the change of the angle since the step began.
+fn angle_motion(pair: ptr<function, Pair>, joint: Joint, axis: Axis) -> AngleMotion {
+    let on_b = quat_mul((*pair).b.dq, joint.frame_b);
+    let now = quat_mul(conjugate(on_b), quat_mul((*pair).a.dq, joint.frame_a));
+    var angles = angles_of(now);
+    var value = angles.values[0];
+    var direction = angles.directions[0];
+    var last = -1.5;
+    for (var i = 1u; i < 8u; i++) {
+        let is_beyond = last > axis.coordinate;
+        value = select(value, angles.values[i], is_beyond);
+        direction = select(direction, angles.directions[i], is_beyond);
+        last -= 1.0;
+    }
+    // A twist continues beyond pi.
+    let is_twist = axis.coordinate > -1.5;
+    let moved = value - axis.start;
+    let back = select(0.0, 6.2831855, is_twist && -3.1415927 > moved);
+    let forth = select(0.0, 6.2831855, is_twist && moved > 3.1415927);
+    return AngleMotion(direction + turned(on_b, direction), moved + back - forth);
+}
+
 // Distances below the root of this have no direction (m^2).
 const MIN_SQUARE: f32 = 1e-12;
 
@@ -27,16 +51,21 @@ fn along_anchors(carried: vec3f, shift: vec3f, length: f32) -> AnchorMotion {
     return AnchorMotion(now, select(square * inverse_sqrt(square) - length, longer, cosine > 0.0));
 }
 
-// The present axis. It turned with b since the step began. The axis of a distance follows the anchors.
+// The present axis. It turned with b since the step began. The axis of a distance follows the anchors, and that of an
+// angle both bodies.
 fn axis_motion(pair: ptr<function, Pair>, joint: Joint, axis: Axis) -> AxisMotion {
     let carried = axis.direction + turned((*pair).b.dq, axis.direction);
+    if 0.0 > axis.coordinate {
+        let angle = angle_motion(pair, joint, axis);
+        return AxisMotion(vec3f(), angle.about, angle.about, angle.moved);
+    }
     let shift = -relative_movement(pair, joint.r_a, joint.r_b);
-    let anchors = along_anchors(carried, shift, axis.length);
+    let anchors = along_anchors(carried, shift, axis.start);
     let now = anchors.now;
     let arm_a = joint.r_a + turned((*pair).a.dq, joint.r_a);
     let arm_b = joint.r_b + turned((*pair).b.dq, joint.r_b) + shift;
-    let shifted = select(dot3(carried, shift), anchors.longer, axis.length > 0.0);
-    let is_linear = axis.is_linear > 0.0;
+    let shifted = select(dot3(carried, shift), anchors.longer, axis.start > 0.0);
+    let is_linear = axis.coordinate > 0.0;
     return AxisMotion(
         select(vec3f(), now, is_linear),
         select(carried, cross3(arm_a, now), is_linear),

@@ -30,12 +30,12 @@ struct Point {
     tangent_mass: f32, approach_velocity: f32, slip_1: f32, slip_2: f32,
 }
 
-struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f, is_loose: f32, first_axis: u32, axis_count: u32 }
+struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f, is_loose: f32, first_axis: u32, axis_count: u32, frame_a: vec4f, frame_b: vec4f }
 
 struct Axis {
-    direction: vec3f, is_linear: f32,
+    direction: vec3f, coordinate: f32,
     gap: f32, left: f32, speed: f32, max_impulse: f32,
-    rate: f32, mass_scale: f32, impulse_scale: f32, length: f32,
+    rate: f32, mass_scale: f32, impulse_scale: f32, start: f32,
 }
 
 struct JointImpulse { linear: vec3f }

@@ -4,7 +4,10 @@ use super::Rules;
 use super::pair::{has_locks, inverse_masses, keep_locks, note_correction, relative_movement};
 use super::rows::{Axis, Joint, Pair, StepParams};
 use crate::constants::MIN_MOVED;
-use crate::math::{Lane, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, select3, smaller, turned, vec3};
+use crate::math::angles::{self, Angles};
+use crate::math::{
+    Lane, Quat, Vec3, conjugate, cross3, dot3, larger, quat_mul, reciprocal, select3, smaller, turned, vec3,
+};
 
 /// Motion of the bodies along an axis. Twin of the WGSL struct `AxisMotion`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,6 +31,51 @@ pub fn relative_turn<L: Lane>(pair: &Pair<L>) -> Vec3<L> {
     half * (L::constant(2.0) + dot3(half, half) * L::constant(1.0 / 3.0))
 }
 
+/// A joint with its frames at the present poses of its bodies. The rows of a joint share them.
+#[derive(Clone, Copy)]
+pub struct Frames<'a, L> {
+    joint: &'a Joint<L>,
+    /// The rotation of a in the frame on b.
+    angles: Angles<L>,
+    /// Rotation of the frame on b.
+    on_b: Quat<L>,
+}
+
+impl<'a, L: Lane> Frames<'a, L> {
+    /// The frames; zeros for a joint without frames.
+    #[inline(always)]
+    pub fn of(pair: &Pair<L>, joint: &'a Joint<L>) -> Self {
+        let frame = joint.frame_b;
+        let square = frame.w * frame.w + dot3(frame.axis, frame.axis);
+        if !L::any(square.gt(L::constant(0.5))) {
+            let (values, directions) = ([L::default(); angles::COUNT], [Vec3::default(); angles::COUNT]);
+            return Self { joint, angles: Angles { values, directions }, on_b: Quat::default() };
+        }
+        let on_b = quat_mul(pair.b.dq, joint.frame_b);
+        let angles = Angles::of(quat_mul(conjugate(on_b), quat_mul(pair.a.dq, joint.frame_a)));
+        Self { joint, angles, on_b }
+    }
+
+    /// The axis of an angle between the frames, and the change of the angle since the step began.
+    #[inline(always)]
+    fn angle_motion(&self, axis: &Axis<L>) -> (Vec3<L>, L) {
+        let Angles { values, directions } = &self.angles;
+        let (mut value, mut direction) = (values[0], directions[0]);
+        for i in 1..angles::COUNT {
+            let is_beyond = L::constant(-0.5 - i as f64).gt(axis.coordinate);
+            value = L::select(value, values[i], is_beyond);
+            direction = select3(direction, directions[i], is_beyond);
+        }
+        // A twist continues beyond pi.
+        let turn = L::constant(std::f64::consts::TAU);
+        let is_twist = axis.coordinate.gt(L::constant(-1.5));
+        let moved = value - axis.start;
+        let back = L::select(L::constant(0.0), turn, L::and(is_twist, L::constant(-std::f64::consts::PI).gt(moved)));
+        let forth = L::select(L::constant(0.0), turn, L::and(is_twist, moved.gt(L::constant(std::f64::consts::PI))));
+        (direction + turned(self.on_b, direction), moved + back - forth)
+    }
+}
+
 /// Distances below the root of this have no direction (m²).
 const MIN_SQUARE: f64 = 1e-12;
 
@@ -45,24 +93,34 @@ fn along_anchors<L: Lane>(carried: Vec3<L>, shift: Vec3<L>, length: L) -> (Vec3<
     (now, L::select(square * square.inverse_sqrt() - length, longer, cosine.gt(L::constant(0.0))))
 }
 
-/// The present axis. It turned with b since the step began. The axis of a distance follows the anchors.
+/// The present axis. It turned with b since the step began. The axis of a distance follows the anchors, and that of an
+/// angle both bodies.
 #[inline(always)]
-pub fn axis_motion<L: Lane>(pair: &Pair<L>, joint: &Joint<L>, axis: &Axis<L>) -> AxisMotion<L> {
+pub fn axis_motion<L: Lane>(pair: &Pair<L>, frames: &Frames<L>, axis: &Axis<L>) -> AxisMotion<L> {
+    let joint = frames.joint;
     let zero = L::constant(0.0);
-    let is_linear = axis.is_linear.gt(zero);
+    let is_linear = axis.coordinate.gt(zero);
     let carried = axis.direction + turned(pair.b.dq, axis.direction);
     // The anchor of a relative to the point of b that was at the same place when the step began.
     let shift = -relative_movement(pair, joint.r_a, joint.r_b);
-    let (now, distance) = along_anchors(carried, shift, axis.length);
+    let (now, distance) = along_anchors(carried, shift, axis.start);
     let arm_a = joint.r_a + turned(pair.a.dq, joint.r_a);
     let arm_b = joint.r_b + turned(pair.b.dq, joint.r_b) + shift;
-    let shifted = L::select(dot3(carried, shift), distance, axis.length.gt(zero));
-    AxisMotion {
+    let shifted = L::select(dot3(carried, shift), distance, axis.start.gt(zero));
+    let mut motion = AxisMotion {
         along: select3(Vec3::default(), now, is_linear),
         about_a: select3(carried, cross3(arm_a, now), is_linear),
         about_b: select3(carried, cross3(arm_b, now), is_linear),
         moved: L::select(dot3(carried, relative_turn(pair)), shifted, is_linear),
+    };
+    let is_angle = zero.gt(axis.coordinate);
+    if L::any(is_angle) {
+        let (about, moved) = frames.angle_motion(axis);
+        motion.about_a = select3(motion.about_a, about, is_angle);
+        motion.about_b = select3(motion.about_b, about, is_angle);
+        motion.moved = L::select(motion.moved, moved, is_angle);
     }
+    motion
 }
 
 /// Speed of a against b.
@@ -105,8 +163,8 @@ pub fn axis_inverse_mass<L: Lane>(pair: &Pair<L>, motion: &AxisMotion<L>) -> L {
 
 /// Applies the carried impulse of an axis. Kernel `warm_start_joints`.
 #[inline(always)]
-pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, axis: &Axis<L>, impulse: L) {
-    let motion = axis_motion(pair, joint, axis);
+pub fn warm_start_axis<L: Lane>(pair: &mut Pair<L>, frames: &Frames<L>, axis: &Axis<L>, impulse: L) {
+    let motion = axis_motion(pair, frames, axis);
     apply_axis_impulse(pair, &motion, impulse);
 }
 
@@ -150,12 +208,12 @@ pub fn solve_axis<L: Lane>(
     but_locks: bool,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
-    joint: &Joint<L>,
+    frames: &Frames<L>,
     axis: &Axis<L>,
     impulse: &mut L,
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let motion = axis_motion(pair, joint, axis);
+    let motion = axis_motion(pair, frames, axis);
     let mass = reciprocal(axis_inverse_mass(pair, &motion));
 
     // The nearer of the two limits acts. It pushes the body inward.

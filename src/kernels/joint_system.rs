@@ -10,7 +10,7 @@
 //! (`JointSystems`).
 
 use super::Rules;
-use super::axis::{AxisMotion, NearerLimit, axis_motion, axis_speed, is_lock};
+use super::axis::{AxisMotion, Frames, NearerLimit, axis_motion, axis_speed, is_lock};
 use super::joint::current_anchors;
 use super::pair::{relative_movement, relative_velocity};
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
@@ -390,8 +390,9 @@ pub fn begin_system<L: Lane>(
         if row.is_of_anchors() {
             motions = anchor_motions(&pair, &joint);
         } else {
+            let frames = Frames::of(&pair, &joint);
             for (at, k) in row.axes() {
-                motions[at] = axis_motion(&pair, &joint, &rows.axis(i, k));
+                motions[at] = axis_motion(&pair, &frames, &rows.axis(i, k));
             }
         }
         factors.nodes[i] = JointNode::of(&pair, &motions);
@@ -451,10 +452,10 @@ pub fn measure_axis<L: Lane>(
     rules: Rules,
     params: &StepParams<L>,
     pair: &mut Pair<L>,
-    joint: &Joint<L>,
+    frames: &Frames<L>,
     axis: &Axis<L>,
 ) -> L {
-    let motion = axis_motion(pair, joint, axis);
+    let motion = axis_motion(pair, frames, axis);
     let zero = L::constant(0.0);
     let NearerLimit { is_limit, is_upper, gap, apart } = NearerLimit::of(axis, &motion);
     let rate = if rules.biased { params.joint.bias_rate } else { zero };

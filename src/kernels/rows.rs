@@ -108,6 +108,10 @@ pub struct Joint<L> {
     pub gap: Vec3<L>,
     /// 1 if the anchors need not coincide.
     pub is_loose: L,
+    /// Rotation of the frame on a when the step begins; zero if no axis is an angle between the frames.
+    pub frame_a: Quat<L>,
+    /// Rotation of the frame on b when the step begins.
+    pub frame_b: Quat<L>,
 }
 
 /// Twin of the WGSL struct `Axis`, in the order of `AxisRow`, which lanes have in memory.
@@ -116,8 +120,8 @@ pub struct Joint<L> {
 pub struct Axis<L> {
     /// Direction when the step begins.
     pub direction: Vec3<L>,
-    /// 1 to shift along the axis, 0 to turn about it.
-    pub is_linear: L,
+    /// Above 0 a shift, below 0 an angle between two frames that turn, 0 a rotation about the direction.
+    pub coordinate: L,
     /// Position of a when the step begins.
     pub gap: L,
     /// Distance of a from its upper limit when the step begins; `NO_LIMIT` of a row that is no limit.
@@ -132,8 +136,8 @@ pub struct Axis<L> {
     pub mass_scale: L,
     /// Share of the impulse that a spring gives back.
     pub impulse_scale: L,
-    /// Distance between the anchors when the step begins, if the axis joins them.
-    pub length: L,
+    /// Value when the step begins, of a swing or a distance.
+    pub start: L,
 }
 
 /// Twin of the WGSL struct `Impulse`, in its order.
@@ -259,9 +263,9 @@ stored! {
         Vec3: r_a, r_b; [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2]
     }
     Impulse as ImpulseRow { [normal, tangent_1, tangent_2, peak] }
-    Joint as JointRow { Vec3: r_a, r_b, gap; [is_loose] }
+    Joint as JointRow { Vec3: r_a, r_b, gap; Quat: frame_a, frame_b; [is_loose] }
     Axis as AxisRow {
-        Vec3: direction; [is_linear, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, length]
+        Vec3: direction; [coordinate, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, start]
     }
     Momentum as MomentumRow { [t, factor, square] restarts }
 }

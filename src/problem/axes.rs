@@ -100,8 +100,15 @@ fn nearest(angle: f32, to: f32) -> f32 {
 }
 
 /// Writes the rows of a joint for substeps of `substep` seconds. An axis with a drive that is beyond a limit goes back
-/// by the share `limit_rate` of the excess per second (1/s).
-pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rate: f32, rows: &mut Vec<AxisRow>) {
+/// by the share `limit_rate` of the excess per second (1/s). With `has_frames`, angles are those between frames that turn.
+pub(super) fn write(
+    joint: &Joint,
+    motion: &JointMotion,
+    has_frames: bool,
+    substep: f32,
+    limit_rate: f32,
+    rows: &mut Vec<AxisRow>,
+) {
     let is_distance = matches!(joint.linear, Linear::Distance(_));
     for (i, is_drive) in kinds(joint) {
         let axis = axis_of(joint, i);
@@ -115,8 +122,15 @@ pub(super) fn write(joint: &Joint, motion: &JointMotion, substep: f32, limit_rat
         let position = if is_counted { motion.position[i] } else { nearest(motion.position[i], middle) };
         let row = AxisRow {
             direction: motion.direction[i].to_array(),
-            is_linear: if i < 3 { 1.0 } else { 0.0 },
-            length: if is_distance && i == 0 && position > MIN_DISTANCE { position } else { 0.0 },
+            coordinate: match i {
+                0..3 => AxisRow::SHIFT,
+                _ => joint.coordinate(i - 3).filter(|_| has_frames).map_or(AxisRow::TURN, AxisRow::angle),
+            },
+            start: match i {
+                0 if is_distance && position > MIN_DISTANCE => position,
+                3.. if has_frames => motion.start[i - 3],
+                _ => 0.0,
+            },
             left: NO_LIMIT,
             max_impulse: f32::MAX,
             ..AxisRow::default()
@@ -219,7 +233,7 @@ pub(super) fn tune(joint: &Joint, number: usize, substep: f32, world: &World, pr
 /// The speed that a unit impulse along an axis gives when the step begins (1/kg; about an axis 1/(kg m²)).
 fn inverse_mass_along(joint: &JointRow, axis: &AxisRow, masses: &[MassRow]) -> f32 {
     let direction = Vec3::from_array(axis.direction);
-    let is_linear = axis.is_linear > 0.0;
+    let is_linear = axis.coordinate > 0.0;
     let of = |body: u32, arm: [f32; 3]| {
         let inverse = InverseMass::of(&masses[body as usize]);
         let about = if is_linear { Vec3::from_array(arm).cross(direction) } else { direction };

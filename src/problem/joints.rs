@@ -11,7 +11,7 @@ use super::joint_sets::{gap_of_sweeps, promised_gap};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
-use crate::constants::{GROWTH, MAX_TERMS_A_NODE};
+use crate::constants::{GROWTH, MAX_TERMS_A_NODE, SLOW_TURN};
 use crate::effort::{self, Effort, Interface, JointNeed};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
@@ -407,13 +407,18 @@ impl JointRows {
                 impulse.linear = impulse.linear.map(|x| x * (share / before));
             }
             let first_axis = axes.len();
+            let (mut frame_a, mut frame_b) = ([0.0; 4], [0.0; 4]);
             if !joint.is_ball() {
                 let limit_rate = Substep::new(config, substep * share).joint.bias_rate;
                 let mut motion = world.joint_motion(joint);
                 let [first, ..] = &joint.angular;
                 *twist = first.counts_turns().then(|| first.counted(motion.position[3], *twist));
                 motion.position[3] = twist.unwrap_or(motion.position[3]);
-                axes::write(joint, &motion, substep * share, limit_rate, axes);
+                let has_frames = joint.swings() && motion.spin.length() * substep * config.substeps as f32 > SLOW_TURN;
+                axes::write(joint, &motion, has_frames, substep * share, limit_rate, axes);
+                if has_frames {
+                    (frame_a, frame_b) = (motion.frame_a.to_array(), motion.frame_b.to_array());
+                }
                 if before != share && before > 0.0 {
                     for impulse in &mut axis_impulses[first_axis..axes.len()] {
                         impulse.linear[0] *= share / before;
@@ -433,6 +438,8 @@ impl JointRows {
                 r_b: body_b.map_or([0.0; 3], |b| arm(b, anchor_b)),
                 body_b: body_b.map_or(world_row, |b| b as u32),
                 gap: (anchor_b - anchor_a).to_array(),
+                frame_a,
+                frame_b,
                 ..JointRow::default()
             }
         }));

@@ -269,7 +269,7 @@ impl StepProblem {
         let own = first_axis as usize..(first_axis + axis_count) as usize;
         let impulses = &impulses[self.joints.len()..];
         let rows = self.axes[own.clone()].iter().zip(&impulses[own]);
-        let wanted = rows.filter(|(axis, _)| (axis.is_linear > 0.0) == is_linear);
+        let wanted = rows.filter(|(axis, _)| (axis.coordinate > 0.0) == is_linear);
         wanted.map(|(axis, impulse)| Vec3::from(axis.direction) * -impulse.linear[0]).sum()
     }
 

@@ -229,7 +229,7 @@ pub struct TurningRow {
     pub pad: f32,
 }
 
-/// One joint, which makes the anchors of two bodies coincide or guides the bodies by axes, 64 B.
+/// One joint, which makes the anchors of two bodies coincide or guides the bodies by axes, 96 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct JointRow {
@@ -251,6 +251,11 @@ pub struct JointRow {
     pub axis_count: u32,
     #[doc(hidden)]
     pub pad: [u32; 2],
+    /// Rotation of the frame of the joint on a when the step begins, x y z w; zero for a joint whose axes have no
+    /// [`AxisRow::coordinate`] below 0. The sign is such that a's rotation in the frame on b has w >= 0.
+    pub frame_a: [f32; 4],
+    /// Rotation of the frame on b.
+    pub frame_b: [f32; 4],
 }
 
 /// Most rows of axes of one joint: six axes, each with bounds and a drive.
@@ -267,8 +272,8 @@ pub struct AxisRow {
     /// Direction when the step begins, world axes. It turns with b. Its length is 1, or a little more for the angle
     /// about a first axis that is turned aside.
     pub direction: [f32; 3],
-    /// 1 to shift along the axis, 0 to turn about it.
-    pub is_linear: f32,
+    /// [`AxisRow::SHIFT`] along the axis, [`AxisRow::TURN`] about it, or [`AxisRow::angle`] between frames that both turn.
+    pub coordinate: f32,
     /// Position of a when the step begins, above its lower limit or beyond its target (m, rad).
     pub gap: f32,
     /// Distance of a from its upper limit when the step begins (m, rad); [`NO_LIMIT`] of a row that is no limit.
@@ -285,11 +290,22 @@ pub struct AxisRow {
     pub mass_scale: f32,
     /// Share of the impulse that a spring gives back; 0 for other rows.
     pub impulse_scale: f32,
-    /// Distance between the anchors when the step begins, if the axis joins them (m); otherwise 0.
-    pub length: f32,
+    /// Value when the step begins: of [`AxisRow::angle`] (rad); of an axis that joins the anchors, their distance (m);
+    /// otherwise 0.
+    pub start: f32,
 }
 
 impl AxisRow {
+    /// A translation along a direction that turns with b.
+    pub const SHIFT: f32 = 1.0;
+    /// A rotation about a direction that turns with b, for a joint whose first axis does not swing.
+    pub const TURN: f32 = 0.0;
+
+    /// One of the coordinates of a rotation, by its number in [`Angles`](crate::math::angles::Angles).
+    pub fn angle(number: usize) -> f32 {
+        -1.0 - number as f32
+    }
+
     /// Whether the row is a limit, with two different bounds.
     pub fn is_limit(&self) -> bool {
         self.left > 0.5 * NO_LIMIT

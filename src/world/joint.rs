@@ -7,6 +7,7 @@ use glam::{Quat, Vec3};
 use super::bodies::BodyHandle;
 use super::joint_axis::{Axis, Bounds, Drive};
 use crate::error::Result;
+use crate::math::angles;
 use crate::math::rotation;
 use crate::saved::{Archive, Saved};
 
@@ -344,6 +345,24 @@ impl Joint {
     /// Whether the joint keeps the anchors together.
     pub fn holds_anchors(&self) -> bool {
         self.linear == Linear::Axes([Axis::LOCKED; 3])
+    }
+
+    /// Whether the first axis of a may swing against that of b.
+    pub(crate) fn swings(&self) -> bool {
+        self.angular[1..].iter().any(|axis| axis.bounds != Bounds::Locked)
+    }
+
+    /// The coordinate of an angle, by its number in [`Angles`](angles::Angles), if the joint [swings](Self::swings).
+    pub(crate) fn coordinate(&self, angle: usize) -> Option<usize> {
+        let [is_locked, locks_twist] = [angle, 0].map(|angle| self.angular[angle].bounds == Bounds::Locked);
+        let number = match (angle, is_locked) {
+            (0, false) => angles::TWIST,
+            (_, false) => angles::SWING + angle - 1,
+            // A swing without twist has no component of its quaternion along a locked axis.
+            (_, true) if locks_twist => angles::HALVES + angle,
+            (_, true) => angles::HEIGHT + angle - 1,
+        };
+        self.swings().then_some(number)
     }
 
     /// Whether the joint keeps the anchors together and restricts nothing else.

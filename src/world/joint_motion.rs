@@ -9,6 +9,8 @@ use super::joint::{Joint, Linear, NO_FRAME, NOWHERE};
 use super::joint_axis::{Axis, Bounds, Drive};
 use super::limits::{MAX_LENGTH, MAX_SPEED, check_rotation};
 use crate::error::{Result, ensure};
+use crate::math::Quat as Rotation;
+use crate::math::angles::Angles;
 use crate::math::rotation::{product, unit};
 
 /// Position and speed of body a against body b along each axis of a joint: three translations, then three rotations.
@@ -28,18 +30,25 @@ use crate::math::rotation::{product, unit};
 pub struct JointMotion {
     /// Positions (m), then angles (rad). The first angle is the twist about the first axis, from -pi to pi: a world does
     /// not know how often a joint has turned. The other two are the components of the rotation vector that turns the
-    /// first axis. The first position is the distance of the anchors if the joint restricts the distance.
+    /// first axis. If the joint lets the first axis turn, a locked angle is twice a component of the quaternion or the
+    /// height of the first axis above a plane: zero in the same places, and without a jump at half a turn. The first
+    /// position is the distance of the anchors if the joint restricts the distance.
     pub position: [f32; 6],
     /// Rates of the positions and angles (m/s, rad/s).
     pub speed: [f32; 6],
     /// World direction of each axis. The joint pushes body a along it, or turns body a about it.
     pub(crate) direction: [Vec3; 6],
+    /// World rotation of the frame on a, with the sign for which its rotation in the frame on b has w >= 0.
+    pub(crate) frame_a: Quat,
+    /// World rotation of the frame on b.
+    pub(crate) frame_b: Quat,
+    /// The angles as they are between frames (rad), without turns that were counted.
+    pub(crate) start: [f32; 3],
+    /// Spin of a against b (rad/s).
+    pub(crate) spin: Vec3,
     /// The gap between the anchors (m).
     anchor_gap: f32,
 }
-
-/// The smallest value of angle cot(angle). Near pi the direction of the rotation is lost.
-const MAX_TURNED: f32 = -30.0;
 
 /// The largest limit of an angle that counts turns (turns). There, an angle is rounded to 0.0005 rad.
 const MAX_TURNS: f32 = 1000.0;
@@ -62,17 +71,33 @@ impl World {
         let b = joint.body_b.map(|b| self.body(b));
         let (Some(a), Some(b)) = (self.body(joint.body_a), b.map_or(Some(None), |b| b.map(Some))) else {
             let (none, nowhere) = ([f32::NAN; 6], [Vec3::NAN; 6]);
-            return JointMotion { position: none, speed: none, direction: nowhere, anchor_gap: f32::NAN };
+            return JointMotion {
+                position: none,
+                speed: none,
+                direction: nowhere,
+                frame_a: Quat::NAN,
+                frame_b: Quat::NAN,
+                start: [f32::NAN; 3],
+                spin: Vec3::NAN,
+                anchor_gap: f32::NAN,
+            };
         };
         let offset = anchor_a - anchor_b;
         let frame_b = product(b.map_or(Quat::IDENTITY, |b| b.rotation), joint.frame_b);
-        let relative = unit(product(frame_b.inverse(), product(a.rotation, joint.frame_a)));
+        let frame_a = product(a.rotation, joint.frame_a);
+        let relative = unit(product(frame_b.inverse(), frame_a));
         let axes_b = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| frame_b * e);
-        let first_a = frame_b * (relative * Vec3::X);
+        let sign = if relative.w < 0.0 { -1.0 } else { 1.0 };
+        let (frame_a, relative) = (frame_a * sign, relative * sign);
+        let Angles { values, directions } = Angles::of(Rotation::load(relative.to_array()));
+        let coordinates = [0, 1, 2].map(|i| joint.coordinate(i).unwrap_or(i));
 
         let mut direction = [Vec3::ZERO; 6];
         direction[..3].copy_from_slice(&axes_b);
         direction[3..].copy_from_slice(&axes_b);
+        if joint.swings() {
+            direction[3..].copy_from_slice(&coordinates.map(|i| frame_b * Vec3::from_array(directions[i].store())));
+        }
         let mut position = [0.0; 6];
         for (position, axis) in position.iter_mut().zip(axes_b) {
             *position = axis.dot(offset);
@@ -83,29 +108,14 @@ impl World {
             (direction[0], position[0]) = (along, distance);
             (direction[1], direction[2], position[1], position[2]) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
         }
-        position[3..].copy_from_slice(&angles(relative));
-        // The twist grows with the spin about the bisector of the first axes of the two bodies.
-        let both = 1.0 + axes_b[0].dot(first_a);
-        if both > 1e-3 {
-            direction[3] = (axes_b[0] + first_a) / both;
-        }
-        // The other two angles are components of a rotation by `angle` about n across e_b. A spin w changes the
-        // rotation by w.n along n, and by angle (w.t cot(angle) + w.e_b) along t = e_b x n.
-        let turn = axes_b[1] * position[4] + axes_b[2] * position[5];
-        let angle = turn.length();
-        if angle > 1e-3 {
-            let n = turn / angle;
-            let t = axes_b[0].cross(n);
-            let across = t * (angle / libm::tanf(angle)).max(MAX_TURNED) + axes_b[0] * angle;
-            for direction in &mut direction[4..] {
-                *direction = n * n.dot(*direction) + across * t.dot(*direction);
-            }
-        }
+        let start = coordinates.map(|i| values[i]);
+        position[3..].copy_from_slice(&start);
         let velocity = a.linear_velocity + a.angular_velocity.cross(anchor_a - a.center_of_mass())
             - b.map_or(Vec3::ZERO, |b| b.linear_velocity + b.angular_velocity.cross(anchor_a - b.center_of_mass()));
         let spin = a.angular_velocity - b.map_or(Vec3::ZERO, |b| b.angular_velocity);
         let speed = std::array::from_fn(|i| direction[i].dot(if i < 3 { velocity } else { spin }));
-        JointMotion { position, speed, direction, anchor_gap: anchor_a.distance(anchor_b) }
+        let anchor_gap = anchor_a.distance(anchor_b);
+        JointMotion { position, speed, direction, frame_a, frame_b, start, spin, anchor_gap }
     }
 }
 
@@ -122,18 +132,6 @@ impl JointMotion {
         };
         joint.linear_axes().iter().zip(&self.position).map(outside).map(|x| x * x).sum::<f32>().sqrt()
     }
-}
-
-/// The twist of a rotation about the first axis, and two components of the rotation vector that remains.
-fn angles(q: Quat) -> [f32; 3] {
-    let q = if q.w < 0.0 { -q } else { q };
-    let length = (q.w * q.w + q.x * q.x).sqrt();
-    // The length is zero for a rotation by pi about an axis across the first.
-    let twist = if length > 0.0 { Quat::from_xyzw(q.x / length, 0.0, 0.0, q.w / length) } else { Quat::IDENTITY };
-    let swing = product(q, twist.conjugate());
-    let sine = (swing.y * swing.y + swing.z * swing.z).sqrt();
-    let per_sine = if sine > 0.0 { 2.0 * libm::atan2f(sine, swing.w) / sine } else { 2.0 };
-    [2.0 * libm::atan2f(twist.x, twist.w), swing.y * per_sine, swing.z * per_sine]
 }
 
 impl Joint {
@@ -226,20 +224,12 @@ impl Axis {
 mod tests {
     use super::*;
 
-    #[test]
-    fn angles_are_those_that_a_rotation_is_made_of() {
-        for (twist, swing) in [(0.4, Vec3::new(0.0, 0.3, -0.2)), (-3.0, Vec3::ZERO), (2.0, Vec3::new(0.0, -1.0, 0.5))] {
-            let found = angles(Quat::from_scaled_axis(swing) * Quat::from_rotation_x(twist));
-            assert!(Vec3::from(found).distance(Vec3::new(twist, swing.y, swing.z)) < 1e-5, "{found:?}");
-        }
-    }
-
     /// The check compares angles with speeds across two small rotations.
     #[test]
     fn speeds_are_the_changes_of_angles_at_any_angle() {
         let mut world = World::new();
         let body = world.insert(crate::Body::dynamic().shape(crate::Shape::ball(0.5)));
-        let joint = Joint::to_world(body, Vec3::ZERO, Vec3::ZERO).generic([Axis::FREE; 3], [Axis::LOCKED; 3]);
+        let joint = Joint::to_world(body, Vec3::ZERO, Vec3::ZERO);
         for swing in [Vec3::ZERO, Vec3::new(0.0, 0.4, -0.3), Vec3::new(0.0, -1.2, 0.8), Vec3::new(0.0, 0.7, 2.4)] {
             let rotation = Quat::from_scaled_axis(swing) * Quat::from_rotation_x(0.6);
             for spin in [Vec3::X, Vec3::Y, Vec3::Z] {

@@ -3,7 +3,7 @@
 
 use drystone::config::FrictionRule;
 use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
-use drystone::stages::kernels::axis::axis_motion;
+use drystone::stages::kernels::axis::{Frames, axis_motion};
 use drystone::stages::kernels::contact::{
     current_separation, normal_movement, restitute_contact, solve_contact, warm_start,
 };
@@ -529,7 +529,8 @@ fn the_axis_of_a_joint_turns_with_its_second_body() {
     for (moved, turned) in [(0, DQuat::IDENTITY), (1, DQuat::from_scaled_axis(turn))] {
         let pair = case.pair(moved, DVec3::ZERO, turn);
         let axis = Axis { direction: lane(case.normal), ..Axis::default() };
-        let about = axis_motion(&pair, &Joint::default(), &axis).about_a;
+        let joint = Joint::default();
+        let about = axis_motion(&pair, &Frames::of(&pair, &joint), &axis).about_a;
         assert!(DVec3::new(about.x, about.y, about.z).distance(turned * case.normal) < 1e-14, "body {moved}");
     }
 }

@@ -355,7 +355,7 @@ fn worlds_that_are_turned_moved_mirrored_and_reordered_move_accordingly() {
     }
     // Joints with axes and motors, and five shapes on a plane.
     for (spec, steps, by_cycle, by_way) in [
-        ("four-bar", 300, 1e-6, 5e-5),
+        ("four-bar", 300, 5e-6, 5e-5),
         ("drawbridge", 120, 3e-5, 3e-4),
         ("car", 30, 1e-4, 5e-5),
         // Rounding decides whether a limit is reached in a substep or in the next one.

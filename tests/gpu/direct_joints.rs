@@ -522,7 +522,7 @@ fn the_first_solve_leaves_no_velocity_along_locks() {
             }
             let own = joint.first_axis as usize..(joint.first_axis + joint.axis_count) as usize;
             for axis in problem.axes[own].iter().filter(|axis| axis.is_lock()) {
-                let along = if axis.is_linear > 0.0 { shift } else { turn };
+                let along = if axis.coordinate > 0.0 { shift } else { turn };
                 most = most.max(along.dot(Vec3::from(axis.direction)).abs());
             }
         }

@@ -355,6 +355,7 @@ fn joint_row(random: &mut Random, [body_a, body_b]: [u32; 2]) -> JointRow {
     row.r_b = random.vector(1.0).to_array();
     row.body_b = body_b;
     row.gap = random.vector(0.1).to_array();
+    (row.frame_a, row.frame_b) = (random.rotation().to_array(), random.rotation().to_array());
     row
 }
 
@@ -362,11 +363,15 @@ fn joint_row(random: &mut Random, [body_a, body_b]: [u32; 2]) -> JointRow {
 fn axis_row(random: &mut Random) -> (AxisRow, f32) {
     let mut row = AxisRow::default();
     row.direction = (random.rotation() * Vec3::X).to_array();
-    row.is_linear = if random.happens(0.5) { 1.0 } else { 0.0 };
+    row.coordinate = if random.happens(0.5) { AxisRow::SHIFT } else { AxisRow::TURN };
     row.gap = random.within(-0.2, 0.2);
     row.left = NO_LIMIT;
     row.max_impulse = f32::MAX;
-    row.length = if random.happens(0.3) { random.within(0.5, 2.0) } else { 0.0 };
+    row.start = if random.happens(0.3) { random.within(0.5, 2.0) } else { 0.0 };
+    if random.happens(0.2) {
+        row.coordinate = AxisRow::angle(random.below(8) as usize);
+        row.start = random.within(-1.5, 1.5);
+    }
     let impulse = random.within(-1.0, 1.0);
     match random.below(4) {
         0 => row.left = random.within(0.0, 0.5) - row.gap,

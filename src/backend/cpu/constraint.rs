@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::kernels::axis::{solve_axis, warm_start_axis};
+use crate::kernels::axis::{Frames, solve_axis, warm_start_axis};
 use crate::kernels::contact::{PointRows, restitute_contact, solve_contact, warm_start};
 use crate::kernels::joint::{solve_joint, warm_start_joint};
 use crate::kernels::joint_system::{measure_axis, measure_joint};
@@ -31,8 +31,8 @@ pub(super) trait Constraint: bytemuck::Pod + Sync {
     fn impulse(rows: &[Self], row: u32, k: usize) -> usize;
     /// Whether lanes hold points of the rows of a problem.
     fn are_with_points(problem: &StepProblem) -> bool;
-    /// The numbers of the point, or of the axis, for its impulse `k`.
-    fn point<'a>(&self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]>;
+    /// The numbers of the point, of the axis, or of the frames of a joint, for its impulse `k`.
+    fn point<'a>(&'a self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]>;
 }
 
 impl Constraint for ContactRow {
@@ -60,7 +60,7 @@ impl Constraint for ContactRow {
     fn are_with_points(_: &StepProblem) -> bool {
         true
     }
-    fn point<'a>(&self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]> {
+    fn point<'a>(&'a self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]> {
         problem.points.get(self.first_point as usize + k).map(bytemuck::cast_ref)
     }
 }
@@ -90,8 +90,13 @@ impl Constraint for JointRow {
     fn are_with_points(problem: &StepProblem) -> bool {
         !problem.axes.is_empty()
     }
-    fn point<'a>(&self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]> {
-        problem.axes.get((self.first_axis as usize + k).checked_sub(1)?).filter(|_| k > 0).map(bytemuck::cast_ref)
+    fn point<'a>(&'a self, problem: &'a StepProblem, k: usize) -> Option<&'a [f32; 12]> {
+        if k == 0 {
+            // The place of the anchors holds the frames, after four numbers that nothing reads.
+            let numbers: &[f32; 24] = bytemuck::cast_ref(self);
+            return numbers.last_chunk();
+        }
+        problem.axes.get(self.first_axis as usize + k - 1).map(bytemuck::cast_ref)
     }
 }
 
@@ -151,32 +156,36 @@ pub(super) fn sweep_joint<L: Lane>(
         // Corrections are applied like warm-start impulses.
         Kernel::WarmStartJoints { axes: has_axes } | Kernel::ApplyJointChanges(Rules { axes: has_axes, .. }) => {
             if has_axes {
+                let frames = Frames::of(pair, joint);
                 for k in 0..axes.count() {
-                    warm_start_axis(pair, joint, &axes.axis(k), axes.impulse(k));
+                    warm_start_axis(pair, &frames, &axes.axis(k), axes.impulse(k));
                 }
             }
             warm_start_joint(pair, joint, *impulse);
         }
         Kernel::SolveJoints(rules) => {
             if rules.axes {
+                let frames = Frames::of(pair, joint);
                 for k in 0..axes.count() {
                     let mut impulse = axes.impulse(k);
-                    solve_axis(rules, false, params, pair, joint, &axes.axis(k), &mut impulse);
+                    solve_axis(rules, false, params, pair, &frames, &axes.axis(k), &mut impulse);
                     axes.set_impulse(k, impulse);
                 }
             }
             solve_joint(rules, params, pair, joint, impulse);
         }
         Kernel::SolveAxes(rules) => {
+            let frames = Frames::of(pair, joint);
             for k in 0..axes.count() {
                 let mut impulse = axes.impulse(k);
-                solve_axis(rules, true, params, pair, joint, &axes.axis(k), &mut impulse);
+                solve_axis(rules, true, params, pair, &frames, &axes.axis(k), &mut impulse);
                 axes.set_impulse(k, impulse);
             }
         }
         Kernel::MeasureJoints(rules) => {
+            let frames = Frames::of(pair, joint);
             for k in 0..axes.count() {
-                axes.set_impulse(k, measure_axis(rules, params, pair, joint, &axes.axis(k)));
+                axes.set_impulse(k, measure_axis(rules, params, pair, &frames, &axes.axis(k)));
             }
             *impulse = measure_joint(rules, params, pair, joint);
         }

@@ -14,7 +14,7 @@ use crate::kernels::joint_system::{
 };
 use crate::kernels::{Axis, Joint, Mass, Pair, Sym3};
 use crate::lanes::{Lanes, Portable, Shared, WIDTH, Wide, Work, lanes};
-use crate::math::{Lane, Vec3, vec3};
+use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::problem::{AxisRow, JointRow, JointSystems, StepProblem};
 
 /// With fewer systems of equal structure, they are solved one after another: a column of one system fills a quarter of
@@ -374,15 +374,23 @@ impl<L: Lanes> SystemRows<L> for SideBySide<'_, '_> {
         let SystemWork { problem, slots, bodies, .. } = self.work;
         let rows: [&JointRow; WIDTH] =
             lanes!(lane => &problem.joints[problem.systems.nodes[self.first_nodes[lane] + node].joint as usize]);
-        let numbers: [&[f32; 16]; WIDTH] = lanes!(lane => bytemuck::cast_ref(rows[lane]));
-        // SAFETY: a row has sixteen numbers.
-        let ([ax, ay, az, _, bx, by, bz, _], [gx, gy, gz, is_loose, ..]) = unsafe {
+        let numbers: [&[f32; 24]; WIDTH] = lanes!(lane => bytemuck::cast_ref(rows[lane]));
+        // SAFETY: a row has twenty-four numbers.
+        let ([ax, ay, az, _, bx, by, bz, _], [gx, gy, gz, is_loose, ..], [fx, fy, fz, fw, x, y, z, w]) = unsafe {
             (
                 L::columns(&lanes!(lane => numbers[lane].as_ptr())),
                 L::columns(&lanes!(lane => numbers[lane].as_ptr().add(8))),
+                L::columns(&lanes!(lane => numbers[lane].as_ptr().add(16))),
             )
         };
-        let joint = Joint { r_a: vec3(ax, ay, az), r_b: vec3(bx, by, bz), gap: vec3(gx, gy, gz), is_loose };
+        let joint = Joint {
+            r_a: vec3(ax, ay, az),
+            r_b: vec3(bx, by, bz),
+            gap: vec3(gx, gy, gz),
+            is_loose,
+            frame_a: Quat { axis: vec3(fx, fy, fz), w: fw },
+            frame_b: Quat { axis: vec3(x, y, z), w },
+        };
         let a = lanes!(lane => place(slots[rows[lane].body_a as usize] as usize));
         let b = lanes!(lane => place(slots[rows[lane].body_b as usize] as usize));
         let states = bodies.as_ptr();
@@ -399,14 +407,14 @@ impl<L: Lanes> SystemRows<L> for SideBySide<'_, '_> {
         let numbers: [&[f32; 12]; WIDTH] =
             lanes!(lane => bytemuck::cast_ref(self.work.axis_row(self.first_nodes[lane] + node, k)));
         // SAFETY: a row has twelve numbers.
-        let ([x, y, z, is_linear, gap, left, speed, max_impulse], [.., rate, mass_scale, impulse_scale, length]) = unsafe {
+        let ([x, y, z, coordinate, gap, left, speed, max_impulse], [.., rate, mass_scale, impulse_scale, start]) = unsafe {
             (
                 L::columns(&lanes!(lane => numbers[lane].as_ptr())),
                 L::columns(&lanes!(lane => numbers[lane].as_ptr().add(4))),
             )
         };
         let direction = vec3(x, y, z);
-        Axis { direction, is_linear, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, length }
+        Axis { direction, coordinate, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, start }
     }
 
     #[inline(always)]

@@ -10,9 +10,9 @@ use std::ops::Range;
 
 use super::constraint::AxisRows;
 use crate::kernels::contact::PointRows;
-use crate::kernels::{Axis, Impulse, Point};
+use crate::kernels::{Axis, Impulse, Joint, Point};
 use crate::lanes::{Lanes, Shared, Wide};
-use crate::math::{Vec3, vec3};
+use crate::math::{Quat, Vec3, vec3};
 
 /// Loads lanes without a closure: a closure would be compiled for the plain instruction set.
 macro_rules! loaded {
@@ -286,6 +286,23 @@ impl<L: Lanes> PointRows<L> for GroupRows<'_> {
     }
 }
 
+impl GroupRows<'_> {
+    /// A joint from its arms, gap and looseness, and from its frames in the place of its anchors. Without axes it has no
+    /// frames.
+    #[inline(always)]
+    pub fn joint<L: Lanes>(&self, header: &[Wide; 11]) -> Joint<L> {
+        let [ax, ay, az, bx, by, bz, gx, gy, gz, is_loose] = loaded!(header; 0 1 2 3 4 5 6 7 8 9);
+        let (mut frame_a, mut frame_b) = (Quat::default(), Quat::default());
+        if let (Some(arms), Some(others)) = (self.points.arms.first(), self.points.others.first()) {
+            let [fx, fy, fz, fw] = loaded!(arms; 4 5 6 7);
+            let [y, z, w] = loaded!(others; 0 1 2);
+            frame_a = Quat { axis: vec3(fx, fy, fz), w: fw };
+            frame_b = Quat { axis: vec3(L::load(&self.points.tangent_masses[0]), y, z), w };
+        }
+        Joint { r_a: vec3(ax, ay, az), r_b: vec3(bx, by, bz), gap: vec3(gx, gy, gz), is_loose, frame_a, frame_b }
+    }
+}
+
 /// The axes of a joint come after its anchors.
 impl<L: Lanes> AxisRows<L> for GroupRows<'_> {
     #[inline(always)]
@@ -294,11 +311,11 @@ impl<L: Lanes> AxisRows<L> for GroupRows<'_> {
     }
     #[inline(always)]
     fn axis(&self, k: usize) -> Axis<L> {
-        let [x, y, z, is_linear, gap, left, speed, max_impulse] = loaded!(&self.points.arms[k + 1]; 0 1 2 3 4 5 6 7);
-        let [mass_scale, impulse_scale, length] = loaded!(&self.points.others[k + 1]; 0 1 2);
+        let [x, y, z, coordinate, gap, left, speed, max_impulse] = loaded!(&self.points.arms[k + 1]; 0 1 2 3 4 5 6 7);
+        let [mass_scale, impulse_scale, start] = loaded!(&self.points.others[k + 1]; 0 1 2);
         let rate = L::load(&self.points.tangent_masses[k + 1]);
         let direction = vec3(x, y, z);
-        Axis { direction, is_linear, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, length }
+        Axis { direction, coordinate, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, start }
     }
     #[inline(always)]
     fn impulse(&self, k: usize) -> L {

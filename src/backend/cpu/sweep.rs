@@ -12,7 +12,7 @@ use super::lane_group::{BodyLanes, LaneGroup};
 use super::lane_rows::{GroupRows, OwnImpulses, SharedImpulses, SharedPoints};
 use crate::config::FrictionRule;
 use crate::kernels::contact::sum_impulse;
-use crate::kernels::{Body, Contact, Free, Impulse, Joint, Pair, Rules, StepParams};
+use crate::kernels::{Body, Contact, Free, Impulse, Pair, Rules, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
 use crate::problem::{Params, Substep};
@@ -89,11 +89,9 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
             let contact: &Contact<L> = unsafe { as_lanes(&group.header) };
             sweep_contact(kernel, AS_ONE, params, &mut pair, contact, &mut rows);
         } else {
-            let [joint @ .., _]: &[Wide; 11] = &group.header;
-            // SAFETY: `Joint` is `repr(C)` and holds lanes only.
-            let joint: &Joint<L> = unsafe { as_lanes::<_, 10>(joint) };
+            let joint = rows.joint::<L>(&group.header);
             let mut impulse = rows.impulses.components(0);
-            sweep_joint(kernel, params, &mut pair, joint, &mut impulse, &mut rows);
+            sweep_joint(kernel, params, &mut pair, &joint, &mut impulse, &mut rows);
             rows.impulses.set_components(0, impulse);
         }
         // SAFETY: as above.

@@ -74,10 +74,11 @@ impl<C: Constraint> Load<'_, C> {
     fn take_full<L: Lanes>(&self, group: &mut LaneGroup, points: OwnPoints, mut impulses: OwnImpulses) {
         let rows = C::rows(self.problem);
         let own: [&C; WIDTH] = lanes!(lane => &rows[group.rows[lane] as usize]);
-        let numbers: [&[f32]; WIDTH] = lanes!(lane => bytemuck::cast_slice(std::slice::from_ref(own[lane])));
+        // The header is in the first sixteen numbers.
+        let numbers: [&[f32]; WIDTH] = lanes!(lane => &bytemuck::cast_slice(std::slice::from_ref(own[lane]))[..16]);
         let (low, high) = (first_eight::<L>(&numbers), last_eight::<L>(&numbers));
         for (wide, at) in group.header.iter_mut().zip(C::HEADER) {
-            *wide = if at < 8 { low[at] } else { high[at + 8 - numbers[0].len()] };
+            *wide = if at < 8 { low[at] } else { high[at - 8] };
         }
         let firsts: [usize; WIDTH] = lanes!(lane => C::impulse(rows, group.rows[lane], 0));
         for (k, arms) in points.arms.iter_mut().enumerate() {

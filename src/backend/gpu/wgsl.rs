@@ -76,7 +76,7 @@ macro_rules! part {
 macro_rules! of_joints {
     ($axes:expr, $name:literal) => {
         if $axes {
-            &[part!("lib/pair"), part!("lib/joint"), part!("lib/axes"), part!($name)] as &[&str]
+            &[part!("lib/pair"), part!("lib/joint"), part!("lib/angles"), part!("lib/axes"), part!($name)] as &[&str]
         } else {
             &[part!("lib/pair"), part!("lib/joint"), part!("lib/no_axes"), part!($name)]
         }
@@ -186,6 +186,7 @@ fn kernel_text(kernel: Kernel, target: Target) -> (&'static [&'static str], Stri
             let parts = &[
                 part!("lib/pair"),
                 part!("lib/joint"),
+                part!("lib/angles"),
                 part!("lib/axes"),
                 part!("lib/joint_system"),
                 part!("begin_systems"),

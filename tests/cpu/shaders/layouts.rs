@@ -77,9 +77,9 @@ fn in_rust() -> BTreeMap<String, Layout> {
             preload substep_share
         }
         Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
-        Joint = JointRow { r_a body_a r_b body_b gap is_loose first_axis axis_count }
+        Joint = JointRow { r_a body_a r_b body_b gap is_loose first_axis axis_count frame_a frame_b }
         Axis = AxisRow {
-            direction is_linear gap left speed max_impulse rate mass_scale impulse_scale length
+            direction coordinate gap left speed max_impulse rate mass_scale impulse_scale start
         }
         JointImpulse = JointImpulseRow { linear }
         JointNode = JointNode { along about_a about_b turn_a turn_b right softness mass_a mass_b locks_a locks_b }
