@@ -16,6 +16,7 @@ pub(crate) mod shape;
 mod shape_parts;
 mod surface;
 mod tag;
+mod voxels;
 
 pub use bodies::{Bodies, BodyHandle};
 pub(crate) use body::Surface;

@@ -1,6 +1,5 @@
 //! The shapes of bodies, built on parry.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
 
@@ -9,6 +8,7 @@ use parry3d::math::Pose;
 use parry3d::shape::{Cylinder, HeightFieldFlags, SharedShape, TriMeshFlags, TypedShape};
 
 use super::limits::{MAX_LENGTH, is_place};
+use super::voxels::Voxels;
 use crate::error::{Error, Result, ensure, input};
 use crate::math::rotation;
 
@@ -108,7 +108,8 @@ impl Shape {
     }
 
     /// The surface of blocks in a grid, as a mesh, for terrain of blocks. The sides of a cell are `size` (m), and the
-    /// cell with the numbers `c` begins at `c * size`. A cell that is named twice counts once.
+    /// cell with the numbers `c` begins at `c * size`. A cell that is named twice counts once. For a body that moves, see
+    /// [`Body::voxels`](crate::Body::voxels).
     ///
     /// ```
     /// use drystone::{Shape, glam::{IVec3, Vec3}};
@@ -123,35 +124,7 @@ impl Shape {
     /// # Errors
     /// There is no cell, a side is not above 0, or a corner is out of range.
     pub fn voxels(size: Vec3, cells: &[IVec3]) -> Result<Self> {
-        ensure(!cells.is_empty(), || "voxels: there are no cells".into())?;
-        ensure(is_place(size) && size.min_element() > 0.0, || {
-            format!("voxels of {size} m: must be more than 0 and at most {MAX_LENGTH:e} m")
-        })?;
-        let solid: BTreeSet<[i64; 3]> = cells.iter().map(|cell| cell.to_array().map(i64::from)).collect();
-        let (mut numbers, mut vertices, mut triangles) = (BTreeMap::new(), Vec::new(), Vec::new());
-        for &cell in &solid {
-            for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
-                let mut beside = cell;
-                beside[axis] += 2 * side - 1;
-                if solid.contains(&beside) {
-                    continue;
-                }
-                // Neighbors share the corners of their faces, so no body catches on the edges between them.
-                let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[along, across]| {
-                    let mut corner = cell;
-                    corner[axis] += side;
-                    corner[(axis + 1) % 3] += along;
-                    corner[(axis + 2) % 3] += across;
-                    *numbers.entry(corner).or_insert_with(|| {
-                        vertices.push(Vec3::from_array(corner.map(|x| x as f32)) * size);
-                        vertices.len() as u32 - 1
-                    })
-                });
-                // Counter-clockwise seen from outside.
-                let [a, b, c, d] = corners;
-                triangles.extend(if side == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
-            }
-        }
+        let (vertices, triangles) = Voxels::new(size, cells)?.surface();
         Self::mesh(vertices, triangles)
     }
 

@@ -867,6 +867,34 @@ fn nothing_falls_through_ground_of_voxels() {
     assert!(heights.len() > 10 && heights.iter().all(|&height| height > 1.2), "{heights:?}");
 }
 
+/// Rapier, voxels3: bodies of blocks fall into the bowl, and a staple of blocks hangs on a bar.
+#[test]
+fn bodies_of_voxels_rest_on_voxels_and_hang_on_what_they_hold() {
+    let staple: Vec<IVec3> =
+        [[0, 0], [0, 1], [0, 2], [1, 2], [2, 2], [2, 1], [2, 0]].map(|[x, y]| IVec3::new(x, y, 0)).to_vec();
+    let cross: Vec<IVec3> = (0..3).flat_map(|axis| [-1, 0, 1].map(|i| IVec3::AXES[axis] * i)).collect();
+    let blocks = |cells: &[IVec3]| Body::dynamic().voxels(Vec3::splat(0.3), cells).expect("blocks");
+    let mut world = World::new();
+    let ground: Vec<IVec3> = (0..64).map(|n| IVec3::new(n % 8, 0, n / 8)).collect();
+    let ground = Shape::voxels(Vec3::ONE, &ground).expect("blocks");
+    world.insert(at(Body::fixed().shape(ground), vec3(-4.0, -1.0, -4.0)));
+    for i in 0..12 {
+        let place = vec3(1.5 * (i % 3) as f32 - 1.5, 1.0 + i as f32, 1.5 * (i / 3) as f32 - 2.25);
+        world.insert(at(blocks(if i % 2 == 0 { &staple } else { &cross }), place));
+    }
+    // The middle of the staple's top is over the bar, which is 0.2 m high.
+    world.insert(at(Body::fixed().shape(Shape::cuboid(0.1, 0.1, 1.0)), vec3(10.45, 5.0, 0.15)));
+    let hung = world.insert(at(blocks(&staple), vec3(10.0, 4.5, 0.0)));
+    let mut simulation = started(world);
+    run(&mut simulation, 600);
+    assert!((body(&simulation, hung).position.y - 4.5).abs() < 1e-3, "{}", body(&simulation, hung).position);
+    for body in simulation.world.dynamic() {
+        assert!(body.position.y > -0.1 && body.linear_velocity.length() < 0.02, "{body:?}");
+    }
+    let deepest = simulation.penetration().max;
+    assert!(deepest < 2e-3, "{deepest} m");
+}
+
 /// Balls of 1 m in a row on threads of 5 m, the last one at 7 m/s. After each step, `watch` gets their velocities.
 fn cradle(count: usize, steps: usize, mut watch: impl FnMut(&[f32])) -> f64 {
     let mut world = World::new();
