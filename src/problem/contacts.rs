@@ -271,6 +271,7 @@ impl ContactRows {
     /// need. `is_one_class`: all substeps have the length of class 0.
     pub fn follow_loads(
         &mut self,
+        world: &World,
         config: &SolverConfig,
         is_one_class: bool,
         problem: &StepProblem,
@@ -299,7 +300,7 @@ impl ContactRows {
             (one, other) => one.or(other),
         };
         let hardest = all.par_chunks_mut(SLOTS_A_TASK).enumerate().map(follow).reduce(|| None, harder);
-        let body = |body: u32| (body != IMMOVABLE).then_some(body as usize);
+        let body = |body: u32| world.bodies.handle(body as usize);
         hardest.map(|(i, need)| HardestContact { bodies: [body(edges[i].a), body(edges[i].b)], need })
     }
 

@@ -334,7 +334,7 @@ impl Stages {
             joints.choose(world, config, dt / config.substeps as f32, problem);
             joints.follow_loads(world, dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
-            stats.hardest = contacts.follow_loads(config, effort.is_one_class(), problem);
+            stats.hardest = contacts.follow_loads(world, config, effort.is_one_class(), problem);
             if are_sorted_anew {
                 contacts.sort(detector, problem);
             }

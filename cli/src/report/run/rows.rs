@@ -50,7 +50,8 @@ impl RunReport {
             let each: Vec<_> =
                 self.efforts.iter().map(|row| format!("{} bodies with {}", row.bodies, row.substeps)).collect();
             let why = self.hardest_contact.filter(|hardest| hardest.need > 1.0).map_or_else(String::new, |hardest| {
-                let bodies: Vec<_> = hardest.bodies.iter().flatten().map(|body| format!("body {body}")).collect();
+                let bodies: Vec<_> =
+                    hardest.bodies.iter().flatten().map(|body| format!("body {}", body.index())).collect();
                 format!(
                     "; {} would sag {:.3} times as deep as promised with {substeps}",
                     bodies.join(" on "),
