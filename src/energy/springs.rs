@@ -6,7 +6,7 @@ use super::{Entry, can_move, ends, moved_by};
 use crate::config::SolverConfig;
 use crate::constants::LAST_BITS;
 use crate::kernels::Rules;
-use crate::kernels::axis::{Frames, axis_inverse_mass, axis_motion, axis_speed};
+use crate::kernels::axis::{AxisMotion, Frames, axis_inverse_mass, axis_motion, axis_speed};
 use crate::kernels::pair::relative_movement;
 use crate::kernels::rows::{Axis, Body as BodyOf, Joint, Mass, Pair};
 use crate::math::dot3;
@@ -38,7 +38,7 @@ pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &
         }
         for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
             let axis = Axis::<f64>::load(&problem.axes[k]);
-            let moved = axis_motion(&pair, &Frames::of(&pair, &of_joint), &axis).moved;
+            let moved = motion_of(&pair, &of_joint, &axis).moved;
             let (place, left) = (axis.gap + moved, axis.left - moved);
             let gap = if problem.axes[k].is_limit() { place.min(left).min(0.0) } else { place };
             energy += (axis_impulse(problem, k, &problem.joint_impulses) * gap).abs();
@@ -73,7 +73,7 @@ pub(super) fn add_springs_at_start(
         for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
             let axis = Axis::<f64>::load(&problem.axes[k]);
             let gap = if problem.axes[k].is_limit() { axis.gap.min(axis.left).min(0.0) } else { axis.gap };
-            let motion = axis_motion(&pair, &Frames::of(&pair, &of_joint), &axis);
+            let motion = motion_of(&pair, &of_joint, &axis);
             energy += 0.5 * (frequency * gap).powi(2) / axis_inverse_mass(&pair, &motion);
         }
         entries[body as usize].kept += energy.min(0.5 * mass * f64::from(config.push_limit).powi(2));
@@ -126,8 +126,7 @@ pub(super) fn add_work_of_drives(
         let start = pair_at_start(&end, world, joint);
         for (number, k) in axes_of(joint).take(drives).enumerate() {
             let axis = Axis::<f64>::load(&problem.axes[k]);
-            let motion = |pair| axis_motion(pair, &Frames::of(pair, &of_joint), &axis);
-            let motions = [&start, &end].map(|pair| (pair, motion(pair)));
+            let motions = [&start, &end].map(|pair| (pair, motion_of(pair, &of_joint, &axis)));
             let speeds = motions.each_ref().map(|(pair, motion)| axis_speed(Rules::default(), pair, motion));
             if axis.impulse_scale > 0.0 {
                 let h = substep(body as usize);
@@ -157,6 +156,10 @@ fn axes_of(joint: &JointRow) -> std::ops::Range<usize> {
 
 fn axis_impulse(problem: &StepProblem, axis: usize, impulses: &[JointImpulseRow]) -> f64 {
     f64::from(impulses[problem.joints.len() + axis].linear[0])
+}
+
+fn motion_of(pair: &Pair<f64>, joint: &Joint<f64>, axis: &Axis<f64>) -> AxisMotion<f64> {
+    axis_motion(pair, &Frames::of(pair, joint), axis)
 }
 
 /// The bodies of a joint at the end of the step.

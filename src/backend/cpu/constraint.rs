@@ -152,11 +152,11 @@ pub(super) fn sweep_joint<L: Lane>(
     impulse: &mut Vec3<L>,
     axes: &mut impl AxisRows<L>,
 ) {
+    let frames = Frames::of(pair, joint);
     match kernel {
         // Corrections are applied like warm-start impulses.
         Kernel::WarmStartJoints { axes: has_axes } | Kernel::ApplyJointChanges(Rules { axes: has_axes, .. }) => {
             if has_axes {
-                let frames = Frames::of(pair, joint);
                 for k in 0..axes.count() {
                     warm_start_axis(pair, &frames, &axes.axis(k), axes.impulse(k));
                 }
@@ -165,7 +165,6 @@ pub(super) fn sweep_joint<L: Lane>(
         }
         Kernel::SolveJoints(rules) => {
             if rules.axes {
-                let frames = Frames::of(pair, joint);
                 for k in 0..axes.count() {
                     let mut impulse = axes.impulse(k);
                     solve_axis(rules, false, params, pair, &frames, &axes.axis(k), &mut impulse);
@@ -175,7 +174,6 @@ pub(super) fn sweep_joint<L: Lane>(
             solve_joint(rules, params, pair, joint, impulse);
         }
         Kernel::SolveAxes(rules) => {
-            let frames = Frames::of(pair, joint);
             for k in 0..axes.count() {
                 let mut impulse = axes.impulse(k);
                 solve_axis(rules, true, params, pair, &frames, &axes.axis(k), &mut impulse);
@@ -183,7 +181,6 @@ pub(super) fn sweep_joint<L: Lane>(
             }
         }
         Kernel::MeasureJoints(rules) => {
-            let frames = Frames::of(pair, joint);
             for k in 0..axes.count() {
                 axes.set_impulse(k, measure_axis(rules, params, pair, &frames, &axes.axis(k)));
             }
