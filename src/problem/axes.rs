@@ -124,7 +124,8 @@ pub(super) fn write(
             direction: motion.direction[i].to_array(),
             coordinate: match i {
                 0..3 => AxisRow::SHIFT,
-                _ => joint.coordinate(i - 3).filter(|_| has_frames).map_or(AxisRow::TURN, AxisRow::angle),
+                _ if has_frames => AxisRow::angle(joint.coordinate(i - 3)),
+                _ => AxisRow::TURN,
             },
             start: match i {
                 0 if is_distance && position > MIN_DISTANCE => position,

@@ -298,7 +298,8 @@ pub struct AxisRow {
 impl AxisRow {
     /// A translation along a direction that turns with b.
     pub const SHIFT: f32 = 1.0;
-    /// A rotation about a direction that turns with b, for a joint whose first axis does not swing.
+    /// A rotation about a direction that turns with b, for a joint whose first axis does not swing, or whose bodies hardly
+    /// turn against each other in the step.
     pub const TURN: f32 = 0.0;
 
     /// One of the coordinates of a rotation, by its number in [`Angles`](crate::math::angles::Angles).

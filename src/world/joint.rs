@@ -352,17 +352,16 @@ impl Joint {
         self.angular[1..].iter().any(|axis| axis.bounds != Bounds::Locked)
     }
 
-    /// The coordinate of an angle, by its number in [`Angles`](angles::Angles), if the joint [swings](Self::swings).
-    pub(crate) fn coordinate(&self, angle: usize) -> Option<usize> {
-        let [is_locked, locks_twist] = [angle, 0].map(|angle| self.angular[angle].bounds == Bounds::Locked);
-        let number = match (angle, is_locked) {
-            (0, false) => angles::TWIST,
-            (_, false) => angles::SWING + angle - 1,
+    /// The coordinate of an angle, by its number in [`Angles`](angles::Angles). Where nothing swings, none jumps.
+    pub(crate) fn coordinate(&self, angle: usize) -> usize {
+        let needs_lock = |angle: usize| self.swings() && self.angular[angle].bounds == Bounds::Locked;
+        match angle {
+            0 if !needs_lock(0) => angles::TWIST,
+            _ if !needs_lock(angle) => angles::SWING + angle - 1,
             // A swing without twist has no component of its quaternion along a locked axis.
-            (_, true) if locks_twist => angles::HALVES + angle,
-            (_, true) => angles::HEIGHT + angle - 1,
-        };
-        self.swings().then_some(number)
+            _ if needs_lock(0) => angles::HALVES + angle,
+            _ => angles::HEIGHT + angle - 1,
+        }
     }
 
     /// Whether the joint keeps the anchors together and restricts nothing else.

@@ -30,7 +30,7 @@ use crate::math::rotation::{product, unit};
 pub struct JointMotion {
     /// Positions (m), then angles (rad). The first angle is the twist about the first axis, from -pi to pi: a world does
     /// not know how often a joint has turned. The other two are the components of the rotation vector that turns the
-    /// first axis. If the joint lets the first axis turn, a locked angle is twice a component of the quaternion or the
+    /// first axis. If the joint lets the first axis swing, a locked angle is twice a component of the quaternion or the
     /// height of the first axis above a plane: zero in the same places, and without a jump at half a turn. The first
     /// position is the distance of the anchors if the joint restricts the distance.
     pub position: [f32; 6],
@@ -90,7 +90,7 @@ impl World {
         let sign = if relative.w < 0.0 { -1.0 } else { 1.0 };
         let (frame_a, relative) = (frame_a * sign, relative * sign);
         let Angles { values, directions } = Angles::of(Rotation::load(relative.to_array()));
-        let coordinates = [0, 1, 2].map(|i| joint.coordinate(i).unwrap_or(i));
+        let coordinates = [0, 1, 2].map(|angle| joint.coordinate(angle));
 
         let mut direction = [Vec3::ZERO; 6];
         direction[..3].copy_from_slice(&axes_b);
