@@ -243,10 +243,11 @@ impl Energy {
         self.fresh.extend(self.kept.len()..world.bodies.len());
         self.kept.resize(world.bodies.len(), Kept::default());
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
+        self.note_jointed(problem);
         let entry = |(i, body): (usize, &Body)| Entry {
             reserve: self.kept[i].reserve.into(),
             kept: self.kept[i].springs.into(),
-            ..entry(body, i, problem, dt.into(), substep(i))
+            ..entry(body, i, problem, dt.into(), substep(i), self.jointed[i])
         };
         world.bodies.par_iter().with_min_len(256).enumerate().map(entry).collect_into_vec(&mut self.entries);
         self.add_energy_of_stiffness_inertia(world, problem);
@@ -363,7 +364,7 @@ impl Energy {
         for (i, &number) in members() {
             let account = &mut accounts[number as usize];
             if !account.is_held {
-                let substep = f64::from(problem.blocks[effort.block_of(i)].substep.length);
+                let substep = if self.jointed[i] { problem.blocks[effort.block_of(i)].substep.length.into() } else { 0.0 };
                 account.common.add(&common(&world.bodies[i], i, problem, substep));
             }
         }
@@ -371,19 +372,21 @@ impl Energy {
         free.for_each(|account| account.all.leave_out(account.common));
     }
 
+    /// Notes which bodies joints hold.
+    fn note_jointed(&mut self, problem: &StepProblem) {
+        self.jointed.clear();
+        self.jointed.resize(problem.bodies.len(), false);
+        let joints = problem.rows_of(&problem.joint_colors()).iter();
+        let ends = joints.flat_map(|&j| ends(&problem.joints[j as usize]));
+        ends.for_each(|body| self.jointed[body as usize] = true);
+    }
+
     /// Adds the energy in the springs of contacts of jointed bodies. Joints and contacts can push against each other
     /// without an end, so the springs of these contacts have a budget, too.
     fn add_contacts_of_jointed(&mut self, problem: &StepProblem, effort: &Effort) {
-        self.jointed.clear();
-        self.jointed.resize(problem.bodies.len(), false);
-        let joints = problem.rows_of(&problem.joint_colors());
-        if joints.is_empty() {
+        if problem.rows_of(&problem.joint_colors()).is_empty() {
             return;
         }
-        joints
-            .iter()
-            .flat_map(|&j| ends(&problem.joints[j as usize]))
-            .for_each(|body| self.jointed[body as usize] = true);
         for contact in problem.swept_contacts().filter(|contact| is_jointed(&self.jointed, contact)) {
             let body = moved_by(problem, contact);
             let substep = &problem.blocks[effort.block_of(body)].substep;
@@ -503,7 +506,7 @@ fn ends(joint: &JointRow) -> [u32; 2] {
 }
 
 /// The account of a body, with the work of gravity and forces.
-fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) -> Entry {
+fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64, is_jointed: bool) -> Entry {
     let (row, mass) = (&problem.bodies[i], &problem.masses[i]);
     if mass.inv_mass <= 0.0 {
         return Entry::default();
@@ -511,7 +514,7 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     let m = f64::from(body.mass.mass);
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
     let acceleration = Vec3::from(mass.acceleration);
-    let pushed = m * acceleration.as_dvec3().dot(way(body, row, v, v_0, substep));
+    let pushed = m * acceleration.as_dvec3().dot(way(body, row, [v_0, v], if is_jointed { substep } else { 0.0 }));
     let torque = body.whole_torque();
     let w = Vec3::from(row.w);
     let turned = if torque == Vec3::ZERO { 0.0 } else { f64::from(torque.dot(w + body.angular_velocity)) * (0.5 * dt) };
@@ -536,10 +539,11 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64) ->
     Entry { before, after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
 }
 
-/// Displacement of a body between the times of its velocities, which belong to the middle of a substep (m): at the last
-/// of them the body has moved half a substep further, but not at the first. It is the displacement between the stored
-/// positions, so that the work of a constant force over many steps has no rounding that adds up.
-fn way(body: &Body, row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 {
+/// Displacement of a body between the times of its velocities (m). Those of jointed bodies belong to the middle of a
+/// substep: at the last of them the body has moved half a substep further, but not at the first. It is the displacement
+/// between the stored positions, so that the work of a constant force over many steps has no rounding that adds up.
+/// `substep` is 0 for a body without joints.
+fn way(body: &Body, row: &BodyRow, [v_0, v]: [DVec3; 2], substep: f64) -> DVec3 {
     let [before, after] = if body.mass.center == Vec3::ZERO {
         [body.position, body.position + Vec3::from(row.dp)]
     } else {
@@ -550,11 +554,12 @@ fn way(body: &Body, row: &BodyRow, v: DVec3, v_0: DVec3, substep: f64) -> DVec3 
 }
 
 /// The part of a body in the common motion of its island.
+/// `substep` is 0 for a body without joints.
 fn common(body: &Body, i: usize, problem: &StepProblem, substep: f64) -> Common {
     let (row, mass) = (&problem.bodies[i], f64::from(body.mass.mass));
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
     let force = mass * Vec3::from(problem.masses[i].acceleration).as_dvec3();
-    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(body, row, v, v_0, substep) }
+    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(body, row, [v_0, v], substep) }
 }
 
 /// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of them

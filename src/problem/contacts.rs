@@ -432,7 +432,6 @@ impl ContactRows {
             config,
             effort,
             effort_changes,
-            substep: substep.length,
             bodies,
             masses,
             poses,

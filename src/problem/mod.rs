@@ -30,7 +30,7 @@ pub use arithmetic::{Mass, Sym3};
 pub(crate) use axes::{drive_count, stiffness};
 pub use blocks::{Block, lay_out};
 pub(crate) use bodies::pose_after;
-pub use bodies::{begin, store};
+pub use bodies::{begin, follow_parabolas, store};
 pub use contacts::{ContactRows, check_material};
 pub use damping::write_dampings;
 pub(crate) use effective::InverseMass;

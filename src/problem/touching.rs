@@ -36,18 +36,17 @@ impl ContactRows {
     }
 
     /// The approaches of contacts that carry a load in the step and are `wanted` by their colliders and approach speed.
-    /// `world` is the world before the step, and `substep` is the length of a substep of class 0 (s).
+    /// `world` is the world before the step.
     pub fn approaches<'a>(
         &'a self,
         world: &'a World,
         problem: &'a StepProblem,
-        substep: f32,
         wanted: impl Fn(&ColliderPair, f32) -> bool + 'a,
     ) -> impl Iterator<Item = Approach> + 'a {
         let rows = self.taken().filter(|&row| self.takes_part(row));
         rows.filter_map(move |row| {
             let (pair, is_swapped) = self.pair(row, problem);
-            let approach = approach(&problem.contacts[row], world, problem, substep)?;
+            let approach = approach(&problem.contacts[row], world, problem)?;
             let normal = if is_swapped { -approach.normal } else { approach.normal };
             wanted(&pair, approach.speed).then_some(Approach { pair, normal, ..approach })
         })
@@ -83,7 +82,7 @@ fn touches(contact: &ContactRow, problem: &StepProblem) -> bool {
 }
 
 /// The fastest approach among the points with an impulse; `None` if no point has one.
-fn approach(contact: &ContactRow, world: &World, problem: &StepProblem, substep: f32) -> Option<Approach> {
+fn approach(contact: &ContactRow, world: &World, problem: &StepProblem) -> Option<Approach> {
     let [a, b] = [contact.body_a, contact.body_b].map(|i| &world.bodies[i as usize]);
     let [pull_a, pull_b] =
         [contact.body_a, contact.body_b].map(|i| Vec3::from_array(problem.masses[i as usize].acceleration));
@@ -96,8 +95,7 @@ fn approach(contact: &ContactRow, world: &World, problem: &StepProblem, substep:
         let u =
             (b.linear_velocity + b.angular_velocity.cross(r_b)) - (a.linear_velocity + a.angular_velocity.cross(r_a));
         let (vn, pull) = (u.dot(normal), (pull_b - pull_a).dot(normal));
-        let ahead = 0.5 * pull * (substep * contact.substep_share);
-        let speed = speed_at_impact(vn, pull, point.separation, ahead);
+        let speed = speed_at_impact(vn, pull, point.separation);
         if fastest.is_none_or(|fastest| speed > fastest.speed) {
             let pair = ColliderPair::default();
             let velocity = |body: u32, r: Vec3| {

@@ -387,8 +387,8 @@ impl Stages {
     }
 
     /// Records the events of the step that ran. `world` is the world before the step.
-    fn note_events(&mut self, world: &World, dt: f32) {
-        let Self { contacts, problem, events, by_body, key, .. } = self;
+    fn note_events(&mut self, world: &World) {
+        let Self { contacts, problem, events, by_body, .. } = self;
         let side = |side| collider_of(world, side);
         if events.listen.sums() {
             let bodies_of = |row: usize| [problem.contacts[row].body_a, problem.contacts[row].body_b];
@@ -400,11 +400,10 @@ impl Stages {
             events.note_contacts(contacts.touching(problem).map(|pair| pair.map(side)));
         }
         if let Some(least) = events.listen.hits_above {
-            let substep = dt / key.config.substeps as f32;
             let mut met = std::mem::take(&mut events.met);
             met.clear();
             let wanted = |pair: &ColliderPair, speed: f32| speed > least || events.waits_for(pair.map(side));
-            met.extend(contacts.approaches(world, problem, substep, wanted).map(|approach| {
+            met.extend(contacts.approaches(world, problem, wanted).map(|approach| {
                 let [a, b] = approach.pair.map(side);
                 let Approach { point, normal, speed, impulse, rest, .. } = approach;
                 Met { hit: Hit { a, b, point, normal, speed, impulse }, left: Some(rest / speed) }
@@ -456,7 +455,8 @@ impl Stages {
 
     /// Stores poses and velocities in the world, and removes energy that constraints added.
     pub fn store(&mut self, world: &mut World, dt: f32) -> Taken {
-        self.note_events(world, dt);
+        self.note_events(world);
+        problem::follow_parabolas(world, &self.effort, dt, &mut self.problem);
         let Self { energy, effort, key, problem, .. } = self;
         let taken = energy.hold(world, problem, effort, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);

@@ -7,7 +7,7 @@ use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{in_place, rms_speed};
 use drystone::stages::backend::CheckedStep;
 use drystone::{
-    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, StepProblem, World,
+    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World,
 };
 use drystone_conform::compare::compare;
 use drystone_scenes::Scene;
@@ -437,10 +437,9 @@ fn the_rows_of_an_island_are_those_of_its_substeps() {
     assert!(substeps >= 32, "{substeps} substeps");
     let fixed = |substeps| next(SolverConfig::default().with(|c| (c.substeps, c.max_substeps) = (substeps, substeps)));
     let (theirs, others) = (fixed(substeps), fixed(8));
-    let approaches = |p: &StepProblem| p.points.iter().map(|p| p.approach_velocity).collect::<Vec<_>>();
     assert_eq!(ours.blocks, theirs.blocks);
+    assert_ne!(ours.blocks, others.blocks);
     assert_eq!(ours.points, theirs.points);
-    assert_ne!(approaches(&ours), approaches(&others));
     let share = 8.0 / substeps as f32;
     assert!(ours.contacts.iter().all(|contact| contact.substep_share == share), "{:?}", ours.contacts);
 }

@@ -14,7 +14,7 @@ pub const SHARE: f64 = 1e-3;
 /// rounding leaves a millionth of their size apart move bodies that rest without gravity.
 pub const SHARE_OF_WEIGHT: f64 = 1e-6;
 /// The most that a world may gain above what it began with, over that. The energy of a motion that springs of joints hold for a while comes back, and
-/// velocities are half a substep off places: law 1, in a form that holds today.
+/// velocities of jointed bodies are half a substep off places: law 1, in a form that holds today.
 pub const MAX_LASTING: f64 = 0.01;
 /// The largest gap of a joint, over its lever, or angle (rad).
 pub const MAX_GAP: f64 = 0.01;

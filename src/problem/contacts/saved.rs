@@ -135,7 +135,6 @@ impl ContactRows {
             config,
             effort,
             effort_changes: false,
-            substep: 0.0,
             bodies: &[],
             masses: &masses,
             poses: &poses,
