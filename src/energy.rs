@@ -364,7 +364,8 @@ impl Energy {
         for (i, &number) in members() {
             let account = &mut accounts[number as usize];
             if !account.is_held {
-                let substep = if self.jointed[i] { problem.blocks[effort.block_of(i)].substep.length.into() } else { 0.0 };
+                let substep =
+                    if self.jointed[i] { problem.blocks[effort.block_of(i)].substep.length.into() } else { 0.0 };
                 account.common.add(&common(&world.bodies[i], i, problem, substep));
             }
         }

@@ -11,8 +11,8 @@ use super::rows::{BodyRow, ConvergenceRow, InertiaRow, JointRow, MassRow, Moment
 use crate::config::{SolverConfig, Stabilization};
 use crate::constants::MAX_ROUNDINGS;
 use crate::effort::Effort;
-use crate::math::{self, Lane, exp_rotation, quat_mul, renormalized};
 use crate::math::rotation::{product, unit};
+use crate::math::{self, Lane, exp_rotation, quat_mul, renormalized};
 use crate::world::{Body, BodyKind, World};
 
 /// Least number of bodies in one task.

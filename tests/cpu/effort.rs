@@ -6,9 +6,7 @@ use drystone::config::{Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{in_place, rms_speed};
 use drystone::stages::backend::CheckedStep;
-use drystone::{
-    Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World,
-};
+use drystone::{Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
 use drystone_conform::compare::compare;
 use drystone_scenes::Scene;
 
