@@ -8,7 +8,8 @@
 //! ```
 //!
 //! has this determinant to the third order in a. Under a constant force f the spring comes to rest at x = f/(m w²), for
-//! any masses behind it. Its period is too long by the share a/2. A spring without damper keeps its energy. A row holds
+//! any masses behind it. Its period is too long by the share a/2. A spring without damper keeps its energy. A spring
+//! that does not swing, z > 1, takes the s with which the slower of its two motions has its exact decay. A row holds
 //! the share 1 - s of the speed that the spring takes away, the share s of the impulse that it gives back, and m r
 //! (docs/derivation.md).
 
@@ -16,6 +17,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Quat, Vec3};
 
+use super::damping::loss_in;
 use super::effective::InverseMass;
 use super::rows::{AxisRow, JointRow, MassRow, NO_LIMIT};
 use super::softness::softness;
@@ -255,7 +257,15 @@ fn spring(frequency: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
         return [soft.bias_rate * soft.mass_scale, soft.impulse_scale];
     }
     let a = damping_ratio * omega * h;
-    let keep = 1.0 / (1.0 + 2.0 * a + 2.0 * a * a);
+    let keep = if damping_ratio > 1.0 {
+        // The slower motion decays by exp(-w h/(z + √(z² - 1))) in a substep: a root of x² - (1 - h r + s) x + s.
+        let loss =
+            loss_in(f64::from(omega * h / (damping_ratio + (damping_ratio * damping_ratio - 1.0).sqrt()))) as f32;
+        let left = 1.0 - loss;
+        left * loss / (loss + left * (omega * h) * (omega * h))
+    } else {
+        1.0 / (1.0 + 2.0 * a + 2.0 * a * a)
+    };
     [keep * omega * omega * h, keep]
 }
 
@@ -282,6 +292,22 @@ mod tests {
             );
             assert!((keep * h * omega * omega / rate - 1.0).abs() < 1e-6, "{frequency} {damping_ratio}: {keep} {rate}");
             assert!((found_decay - a).abs() <= 0.01 * a + 1e-9, "{frequency} {damping_ratio}: {found_decay} {a}");
+        }
+    }
+
+    /// The slower of the two motions of a spring that does not swing has its exact decay, and the law its load.
+    #[test]
+    fn a_spring_beyond_critical_damping_creeps_at_its_rate() {
+        let h = 1.0 / 480.0;
+        for (frequency, damping_ratio) in [(1.0, 1.01), (5.0, 1.5), (20.0, 2.0), (20.0, 10.0)] {
+            let [rate, keep] = spring(frequency, damping_ratio, h).map(f64::from);
+            let [h, omega, ratio] =
+                [f64::from(h), std::f64::consts::TAU * f64::from(frequency), f64::from(damping_ratio)];
+            let sum = 1.0 - h * rate + keep;
+            let slower = 0.5 * (sum + (sum * sum - 4.0 * keep).sqrt());
+            let exact = omega * h * (ratio - (ratio * ratio - 1.0).sqrt());
+            assert!((-slower.ln() / exact - 1.0).abs() < 1e-3, "{frequency} {damping_ratio}: {slower}, {exact}");
+            assert!((keep * h * omega * omega / rate - 1.0).abs() < 1e-6, "{frequency} {damping_ratio}: {keep} {rate}");
         }
     }
 }

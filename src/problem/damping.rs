@@ -33,7 +33,7 @@ impl Decay {
 }
 
 /// 1 - exp(-x) for x >= 0. Sums and products alone give the same bits on every platform.
-fn loss_in(x: f64) -> f64 {
+pub(super) fn loss_in(x: f64) -> f64 {
     // exp(-x) is below the rounding of 1 in double precision.
     if x >= 64.0 {
         return 1.0;
