@@ -988,14 +988,14 @@ fn worst_spring(fifteenths: std::ops::RangeInclusive<usize>) -> f32 {
 #[test]
 fn springs_of_a_stiffness_swing_as_their_closed_form_says() {
     let worst = worst_spring(3..=15);
-    assert!(worst < 0.03, "{worst} m");
+    assert!(worst < 0.1, "{worst} m");
 }
 
 /// Rapier, spring_joints3, for damping ratios from 1 to 2.
 #[test]
 fn springs_with_more_than_critical_damping_creep_as_their_closed_form_says() {
     let worst = worst_spring(16..=30);
-    assert!(worst < 0.1, "{worst} m");
+    assert!(worst < 0.03, "{worst} m");
 }
 
 /// Rapier, joint_motor_position3: springs to angles from -pi to pi, and motors against limits.

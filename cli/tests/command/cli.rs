@@ -98,7 +98,7 @@ fn a_run_reports_on_itself_as_rows() {
 #[test]
 fn a_run_counts_what_comes_and_what_its_sensors_see() {
     let folder = Folder::new();
-    let scene = "run galton -p n=5 -p rows=2 -p every=12 --steps 1100";
+    let scene = "run galton -p n=5 -p rows=2 -p every=12 --steps 1400";
     let ran = folder.json(&format!("{scene} --json"));
     assert_eq!((&ran["bodies"], &ran["came"], &ran["left"]), (&0.into(), &5.into(), &0.into()));
     let counts: Vec<_> = array(&ran, "sensors")
