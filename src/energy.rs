@@ -231,23 +231,25 @@ impl Energy {
         self.fresh.push(body);
     }
 
-    /// Applies the law to the step of `dt` seconds that `problem` has run. `world` is the world before the step.
+    /// Applies the law to the step of `dt` seconds that `problem` has run, with joints on the bodies that are `jointed`.
+    /// `world` is the world before the step.
     pub fn hold(
         &mut self,
         world: &World,
         problem: &mut StepProblem,
         effort: &mut Effort,
+        jointed: Vec<bool>,
         config: &SolverConfig,
         dt: f32,
     ) -> Taken {
+        self.jointed = jointed;
         self.fresh.extend(self.kept.len()..world.bodies.len());
         self.kept.resize(world.bodies.len(), Kept::default());
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
-        self.note_jointed(problem);
         let entry = |(i, body): (usize, &Body)| Entry {
             reserve: self.kept[i].reserve.into(),
             kept: self.kept[i].springs.into(),
-            ..entry(body, i, problem, dt.into(), substep(i), self.jointed[i])
+            ..entry(body, i, problem, dt.into(), substep(i), lag(&self.jointed, problem, effort, i))
         };
         world.bodies.par_iter().with_min_len(256).enumerate().map(entry).collect_into_vec(&mut self.entries);
         self.add_energy_of_stiffness_inertia(world, problem);
@@ -364,22 +366,12 @@ impl Energy {
         for (i, &number) in members() {
             let account = &mut accounts[number as usize];
             if !account.is_held {
-                let substep =
-                    if self.jointed[i] { problem.blocks[effort.block_of(i)].substep.length.into() } else { 0.0 };
-                account.common.add(&common(&world.bodies[i], i, problem, substep));
+                let lag = lag(&self.jointed, problem, effort, i);
+                account.common.add(&common(&world.bodies[i], i, problem, lag));
             }
         }
         let free = accounts.iter_mut().filter(|account| !account.is_held && account.common.mass > 0.0);
         free.for_each(|account| account.all.leave_out(account.common));
-    }
-
-    /// Notes which bodies joints hold.
-    fn note_jointed(&mut self, problem: &StepProblem) {
-        self.jointed.clear();
-        self.jointed.resize(problem.bodies.len(), false);
-        let joints = problem.rows_of(&problem.joint_colors()).iter();
-        let ends = joints.flat_map(|&j| ends(&problem.joints[j as usize]));
-        ends.for_each(|body| self.jointed[body as usize] = true);
     }
 
     /// Adds the energy in the springs of contacts of jointed bodies. Joints and contacts can push against each other
@@ -507,7 +499,7 @@ fn ends(joint: &JointRow) -> [u32; 2] {
 }
 
 /// The account of a body, with the work of gravity and forces.
-fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64, is_jointed: bool) -> Entry {
+fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64, lag: f64) -> Entry {
     let (row, mass) = (&problem.bodies[i], &problem.masses[i]);
     if mass.inv_mass <= 0.0 {
         return Entry::default();
@@ -515,7 +507,7 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64, is
     let m = f64::from(body.mass.mass);
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
     let acceleration = Vec3::from(mass.acceleration);
-    let pushed = m * acceleration.as_dvec3().dot(way(body, row, [v_0, v], if is_jointed { substep } else { 0.0 }));
+    let pushed = m * acceleration.as_dvec3().dot(way(body, row, [v_0, v], lag));
     let torque = body.whole_torque();
     let w = Vec3::from(row.w);
     let turned = if torque == Vec3::ZERO { 0.0 } else { f64::from(torque.dot(w + body.angular_velocity)) * (0.5 * dt) };
@@ -540,27 +532,31 @@ fn entry(body: &Body, i: usize, problem: &StepProblem, dt: f64, substep: f64, is
     Entry { before, after, work: pushed + turned, slack, rest, rounding, ..Entry::default() }
 }
 
-/// Displacement of a body between the times of its velocities (m). Those of jointed bodies belong to the middle of a
-/// substep: at the last of them the body has moved half a substep further, but not at the first. It is the displacement
-/// between the stored positions, so that the work of a constant force over many steps has no rounding that adds up.
-/// `substep` is 0 for a body without joints.
-fn way(body: &Body, row: &BodyRow, [v_0, v]: [DVec3; 2], substep: f64) -> DVec3 {
+/// The time by which the places of a body are ahead of its velocities (s). The velocities of jointed bodies belong to the
+/// middle of a substep.
+fn lag(jointed: &[bool], problem: &StepProblem, effort: &Effort, body: usize) -> f64 {
+    if jointed[body] { 0.5 * f64::from(problem.blocks[effort.block_of(body)].substep.length) } else { 0.0 }
+}
+
+/// Displacement of a body between the times of its velocities `v_0` and `v`, which its places are ahead of by `lag` (m).
+/// It is the displacement between the stored positions, so that the work of a constant force over many steps has no
+/// rounding that adds up.
+fn way(body: &Body, row: &BodyRow, [v_0, v]: [DVec3; 2], lag: f64) -> DVec3 {
     let [before, after] = if body.mass.center == Vec3::ZERO {
         [body.position, body.position + Vec3::from(row.dp)]
     } else {
         let (position, rotation) = pose_after(body, row);
         [body.center_of_mass(), position + rotation * body.mass.center]
     };
-    after.as_dvec3() - before.as_dvec3() - (v - v_0) * (0.5 * substep)
+    after.as_dvec3() - before.as_dvec3() - (v - v_0) * lag
 }
 
 /// The part of a body in the common motion of its island.
-/// `substep` is 0 for a body without joints.
-fn common(body: &Body, i: usize, problem: &StepProblem, substep: f64) -> Common {
+fn common(body: &Body, i: usize, problem: &StepProblem, lag: f64) -> Common {
     let (row, mass) = (&problem.bodies[i], f64::from(body.mass.mass));
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
     let force = mass * Vec3::from(problem.masses[i].acceleration).as_dvec3();
-    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(body, row, [v_0, v], substep) }
+    Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(body, row, [v_0, v], lag) }
 }
 
 /// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of them

@@ -259,10 +259,10 @@ fn spring(frequency: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
     let a = damping_ratio * omega * h;
     let keep = if damping_ratio > 1.0 {
         // The slower motion decays by exp(-w h/(z + √(z² - 1))) in a substep: a root of x² - (1 - h r + s) x + s.
-        let loss =
-            loss_in(f64::from(omega * h / (damping_ratio + (damping_ratio * damping_ratio - 1.0).sqrt()))) as f32;
+        let (turn, slowness) = (omega * h, damping_ratio + (damping_ratio * damping_ratio - 1.0).sqrt());
+        let loss = loss_in(f64::from(turn / slowness)) as f32;
         let left = 1.0 - loss;
-        left * loss / (loss + left * (omega * h) * (omega * h))
+        left * loss / (loss + left * turn * turn)
     } else {
         1.0 / (1.0 + 2.0 * a + 2.0 * a * a)
     };

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::StepProblem;
 use super::damping::Decay;
-use super::rows::{BodyRow, ConvergenceRow, InertiaRow, JointRow, MassRow, MomentumRow, Params, TorqueRow};
+use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params, TorqueRow};
+use super::{Block, StepProblem};
 use crate::config::{SolverConfig, Stabilization};
 use crate::constants::MAX_ROUNDINGS;
 use crate::effort::Effort;
@@ -109,34 +109,30 @@ pub(crate) fn pose_after(body: &Body, row: &BodyRow) -> (Vec3, Quat) {
 
 /// Puts the bodies on which no constraint has acted onto their exact paths. A substep h moves a body by its velocity at
 /// the end, so a step in which the velocity changes by u moves it by u h/2 too far. With the mean of both velocities a
-/// body falls along its parabola, to rounding.
-pub fn follow_parabolas(world: &World, effort: &Effort, dt: f32, problem: &mut StepProblem) {
-    let mut is_tied = vec![false; if problem.joints.is_empty() { 0 } else { problem.bodies.len() }];
-    for &joint in problem.rows_of(&problem.joint_colors()) {
-        let JointRow { body_a, body_b, .. } = problem.joints[joint as usize];
-        [body_a, body_b].into_iter().for_each(|body| is_tied[body as usize] = true);
-    }
+/// body falls along its parabola, to rounding. Bodies that are `jointed` keep the paths of the substeps.
+pub fn follow_parabolas(world: &World, effort: &Effort, jointed: &[bool], dt: f32, problem: &mut StepProblem) {
     let StepProblem { bodies, masses, blocks, .. } = problem;
     let rows = bodies.par_iter_mut().zip(&*masses).zip(world.bodies.par_iter()).enumerate().with_min_len(MIN_BODIES);
     rows.for_each(|(i, ((row, mass), body))| {
-        if mass.inv_mass <= 0.0 || is_tied.get(i) == Some(&true) {
+        if mass.inv_mass <= 0.0 || jointed[i] {
             return;
         }
-        let substep = blocks[effort.block_of(i)].substep.length;
+        let Block { substeps, substep, .. } = &blocks[effort.block_of(i)];
+        let half = 0.5 * substep.length;
         let [v, w] = [row.v, row.w].map(Vec3::from_array);
         let v_0 = body.allowed_velocity(body.linear_velocity);
         let decay = Decay::of(body.linear_damping, dt.into());
         let free = v_0 * (1.0 - decay.loss as f32) + Vec3::from_array(mass.acceleration) * decay.gain as f32;
         // The impulses of the step before, with which a step begins, round the velocities as well.
-        let roundings = 4.0 * (dt / substep).min(MAX_ROUNDINGS as f32);
+        let roundings = 4.0 * (*substeps as f32).min(MAX_ROUNDINGS as f32);
         if v.distance(free) > roundings * f32::EPSILON * v.length().max(v_0.length()) {
             return;
         }
         let turn = w - body.allowed_spin(body.angular_velocity);
-        row.dp = (Vec3::from_array(row.dp) - 0.5 * substep * (v - v_0)).to_array();
+        row.dp = (Vec3::from_array(row.dp) - half * (v - v_0)).to_array();
         // The spin of a body with unequal moments keeps its energy only on the path of the substeps.
         if turn != Vec3::ZERO && !body.mass.is_anisotropic() {
-            let back = exp_rotation(math::Vec3::<f32>::load((turn * (-0.5 * substep)).to_array()));
+            let back = exp_rotation(math::Vec3::<f32>::load((turn * -half).to_array()));
             row.dq = renormalized(quat_mul(back, math::Quat::load(row.dq))).store();
         }
     });

@@ -27,8 +27,11 @@ impl Decay {
     /// Decay at a rate of 0 or more (1/s) over some time (s).
     pub fn of(rate: f32, time: f64) -> Self {
         let x = f64::from(rate) * time;
+        if x <= 0.0 {
+            return Self { loss: 0.0, gain: time };
+        }
         let loss = loss_in(x);
-        Self { loss, gain: if x > 0.0 { time * (loss / x) } else { time } }
+        Self { loss, gain: time * (loss / x) }
     }
 }
 

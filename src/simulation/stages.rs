@@ -456,9 +456,10 @@ impl Stages {
     /// Stores poses and velocities in the world, and removes energy that constraints added.
     pub fn store(&mut self, world: &mut World, dt: f32) -> Taken {
         self.note_events(world);
-        problem::follow_parabolas(world, &self.effort, dt, &mut self.problem);
         let Self { energy, effort, key, problem, .. } = self;
-        let taken = energy.hold(world, problem, effort, &key.config, dt);
+        let jointed = problem.jointed();
+        problem::follow_parabolas(world, effort, &jointed, dt, problem);
+        let taken = energy.hold(world, problem, effort, jointed, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
         let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());
         // The joints are measured within the step. They do not hold the energy of their springs at its end.
