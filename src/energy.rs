@@ -231,18 +231,26 @@ impl Energy {
         self.fresh.push(body);
     }
 
-    /// Applies the law to the step of `dt` seconds that `problem` has run, with joints on the bodies that are `jointed`.
-    /// `world` is the world before the step.
+    /// Notes which bodies joints hold in the step that `problem` has run, and returns it.
+    pub fn note_jointed(&mut self, problem: &StepProblem) -> &[bool] {
+        self.jointed.clear();
+        self.jointed.resize(problem.bodies.len(), false);
+        let joints = problem.rows_of(&problem.joint_colors()).iter();
+        let ends = joints.flat_map(|&j| ends(&problem.joints[j as usize]));
+        ends.for_each(|body| self.jointed[body as usize] = true);
+        &self.jointed
+    }
+
+    /// Applies the law to the step of `dt` seconds that `problem` has run, after [`Self::note_jointed`]. `world` is the
+    /// world before the step.
     pub fn hold(
         &mut self,
         world: &World,
         problem: &mut StepProblem,
         effort: &mut Effort,
-        jointed: Vec<bool>,
         config: &SolverConfig,
         dt: f32,
     ) -> Taken {
-        self.jointed = jointed;
         self.fresh.extend(self.kept.len()..world.bodies.len());
         self.kept.resize(world.bodies.len(), Kept::default());
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);

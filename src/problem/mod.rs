@@ -153,16 +153,6 @@ crate::saved::fields!(StepProblem { params, joint_impulses, systems } scratch {
 });
 
 impl StepProblem {
-    /// Whether a joint that takes part holds each body.
-    pub(crate) fn jointed(&self) -> Vec<bool> {
-        let mut jointed = vec![false; self.bodies.len()];
-        for &joint in self.rows_of(&self.joint_colors()) {
-            let JointRow { body_a, body_b, .. } = self.joints[joint as usize];
-            [body_a, body_b].into_iter().for_each(|body| jointed[body as usize] = true);
-        }
-        jointed
-    }
-
     /// Colors of the contacts of all blocks.
     pub fn contact_colors(&self) -> Range<u32> {
         self.colors_of(|block| block.contacts[0]..block.contacts[1])

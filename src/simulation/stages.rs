@@ -457,9 +457,8 @@ impl Stages {
     pub fn store(&mut self, world: &mut World, dt: f32) -> Taken {
         self.note_events(world);
         let Self { energy, effort, key, problem, .. } = self;
-        let jointed = problem.jointed();
-        problem::follow_parabolas(world, effort, &jointed, dt, problem);
-        let taken = energy.hold(world, problem, effort, jointed, &key.config, dt);
+        problem::follow_parabolas(world, effort, energy.note_jointed(problem), dt, problem);
+        let taken = energy.hold(world, problem, effort, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
         let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());
         // The joints are measured within the step. They do not hold the energy of their springs at its end.
