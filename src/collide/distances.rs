@@ -6,7 +6,7 @@ use parry3d::math::Pose;
 use parry3d::shape::{SharedShape, SupportMap, Triangle, TypedShape};
 use rayon::prelude::*;
 
-use super::facet::{half_space_contact, triangle_contact};
+use super::facet::{Normals, half_space_contact, triangle_contact};
 use super::query::convex_contact;
 use super::solid::{ClipBuffers, ContactQuery, ParryManifold, Solid};
 use super::testing::Random;
@@ -87,7 +87,8 @@ fn is_true(
 /// The contact of a triangle with two sides.
 fn contact_of(corners: [Vec3; 3], solid: &Solid, near: &Aabb, search: ContactQuery, found: &mut ParryManifold) {
     let buffers = &mut ClipBuffers::default();
-    triangle_contact(corners, (&|| None, &mut |_, _, _, _| None), solid, near, search, buffers, found);
+    let normals = Normals { sides: &|| None, open: &mut |_, _, _, _| None, peak: &|_, _| None };
+    triangle_contact(corners, normals, solid, near, search, buffers, found);
 }
 
 #[test]

@@ -63,7 +63,8 @@ pub(super) fn composite_contacts(
                 beside.open(composite, cone, points.iter().map(|point| point.0 + middle), d, rim)
             };
             let sides = || Some(Sides { cone: facet.cone()?, is_free: facet.free_edges().contains(&true) });
-            if triangle_contact(corners, (&sides, &mut open), convex, &near, search, buffers, &mut found).is_some() {
+            let sides = Normals { sides: &sides, open: &mut open, peak: &|corner, d| facet.peak(triangle, corner, d) };
+            if triangle_contact(corners, sides, convex, &near, search, buffers, &mut found).is_some() {
                 found.points.iter_mut().for_each(|point| point.local_p1 += middle);
             }
         } else {
@@ -107,16 +108,23 @@ pub(super) struct Sides {
     pub is_free: bool,
 }
 
-/// Finds the normal nearest to a direction at some points of a triangle. Returns `None` if nothing opens its cone
-/// there.
-pub(super) type Open<'a> = &'a mut dyn FnMut(&FacetCone, &[Corner], Vec3, &mut RimScratch) -> Option<Vec3>;
+/// The normals of contacts with a triangle.
+pub(super) struct Normals<'a> {
+    /// Those of its sides; `None` for a triangle with two sides.
+    pub sides: &'a dyn Fn() -> Option<Sides>,
+    /// Finds the normal nearest to a direction at some points of the triangle. Returns `None` if nothing opens its cone
+    /// there.
+    pub open: &'a mut dyn FnMut(&FacetCone, &[Corner], Vec3, &mut RimScratch) -> Option<Vec3>,
+    /// See [`Facet::peak`].
+    pub peak: &'a dyn Fn(usize, Vec3) -> Option<bool>,
+}
 
 /// The contact of a triangle with a convex shape that is nearer than `prediction` and on the front of the triangle.
 /// Only geometry within the box `near` counts. Normals stay within the cone of its sides, so bodies do not catch on
-/// edges between triangles. Without sides the triangle has two. `open` adds normals at free edges.
+/// edges between triangles. Without sides the triangle has two.
 pub(super) fn triangle_contact(
     [a, mut b, mut c]: [Vec3; 3],
-    (sides, open): (&dyn Fn() -> Option<Sides>, Open),
+    Normals { sides, open, peak }: Normals,
     convex: &Solid,
     near: &Aabb,
     ContactQuery { prediction, size }: ContactQuery,
@@ -214,7 +222,21 @@ pub(super) fn triangle_contact(
     if let Some(Sides { cone, is_free }) = sides {
         let cone = FacetCone::new(&cone);
         let is_in_front = cone.project_local_normal_mut(&mut normal);
-        let opens = is_free && cone.is_in_front(direction) && !FacetCone::is_same(normal, direction);
+        let is_turned = cone.is_in_front(direction) && !FacetCone::is_same(normal, direction);
+        let corners_along = [a, b, c].map(|at| direction.dot(at));
+        let highest = (0..3).max_by(|&i, &j| corners_along[i].total_cmp(&corners_along[j])).unwrap_or(0);
+        let at_peak = || peak(highest, direction).filter(|_| near.contains_local_point([a, b, c][highest]));
+        if let Some(is_first) = is_turned.then(at_peak).flatten() {
+            // All triangles at a peak touch the solid there.
+            let on_solid = [a, b, c][highest] + direction * distance;
+            let on_surface = convex.pose.inverse_transform_point(on_solid);
+            found.local_n1 = direction;
+            found.local_n2 = convex.pose.rotation.inverse() * -direction;
+            let unknown = PackedFeatureId::UNKNOWN;
+            let point = TrackedContact::new([a, b, c][highest], on_surface, unknown, unknown, distance);
+            return is_first.then(|| found.points.push(point));
+        }
+        let opens = is_free && is_turned;
         let opened = opens.then(|| {
             corners.clear();
             if let Some((_, on_patch, ..)) = closest.filter(|closest| closest.0 == direction) {

@@ -77,6 +77,30 @@ impl Facet<'_> {
     }
 }
 
+impl Facet<'_> {
+    /// Whether a corner of this triangle is a peak in a direction: triangles surround the corner, and all lie below it.
+    /// The direction is then a normal of the surface there. The cone of a triangle lacks it, because the cone has only
+    /// the triangles at its edges. If so, tells whether this is the first of the triangles at the corner.
+    pub fn peak(self, triangle: &Triangle, corner: usize, d: Vec3) -> Option<bool> {
+        let at = triangle.vertices()[corner];
+        let size = [1, 2]
+            .map(|i| triangle.vertices()[(corner + i) % 3].distance(at))
+            .into_iter()
+            .fold(f32::INFINITY, f32::min);
+        let (mut is_below, mut first, mut open) = (true, self.number, Vec3::ZERO);
+        each_triangle(self.composite, &Aabb::from_half_extents(at, Vec3::splat(EXACT * size)), |facet, other| {
+            let corners = other.vertices();
+            let Some(k) = (0..3).find(|&k| corners[k].distance(at) <= EXACT * size) else { return };
+            let ends = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
+            is_below &= ends.iter().all(|&end| d.dot(end - at) <= 0.0);
+            // Around a closed fan, each end is the first of one triangle and the second of another.
+            open += ends[1] - ends[0];
+            first = first.min(facet.number);
+        });
+        (is_below && open.length() <= EXACT * size).then_some(first == self.number)
+    }
+}
+
 /// Calls `with` on the triangles of a mesh or height field whose boxes overlap a box. The mesh determines their order.
 pub(super) fn each_triangle(composite: &dyn Shape, around: &Aabb, mut with: impl FnMut(Facet, &Triangle)) {
     if let Some(mesh) = composite.as_trimesh() {

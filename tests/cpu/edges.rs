@@ -517,3 +517,30 @@ fn a_ridge_between_a_box_and_a_mesh_keeps_its_normals() {
         assert!(!normals.is_empty() && normals.iter().all(|n| n.distance(away) < 1e-3), "{away}: {normals:?}");
     }
 }
+
+/// A thin plate comes down flat onto one peak of a mesh and of a height field, and touches it there. Before: no triangle had the normal of its
+/// peak, so the plate met no contact.
+#[test]
+fn a_plate_rests_on_the_peak_of_a_surface() {
+    let around = |i: u32| Vec3::new(0.1 * (0.25 * PI * i as f32).cos(), -1.0, 0.1 * (0.25 * PI * i as f32).sin());
+    let points = [Vec3::ZERO].into_iter().chain((0..8).map(around)).collect();
+    let needle = Shape::mesh(points, (0..8).map(|i| [0, (i + 1) % 8 + 1, i + 1]).collect()).expect("a mesh");
+    let heights: Vec<Vec<f32>> =
+        (0..3).map(|i| (0..3).map(|j| if (i, j) == (1, 1) { 0.0 } else { -1.0 }).collect()).collect();
+    let hill = Shape::height_field(&heights, Vec3::new(0.5, 1.0, 0.5)).expect("a field");
+    for surface in [needle, hill] {
+        for gap in [0.002, -0.002] {
+            let mut world = World::new();
+            world.insert(Body::fixed().shape(surface.clone()));
+            let plate = Body::dynamic().shape(Shape::cuboid(0.3, 0.01, 0.3)).position(0.0, 0.01 + gap, 0.0);
+            let plate = world.insert(plate);
+            let mut simulation =
+                Simulation::with(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a good world");
+            for _ in 0..60 {
+                simulation.step(DT).expect("a step");
+            }
+            let y = simulation.world.bodies[plate].position.y;
+            assert!((y - 0.01).abs() < 1e-3, "from a gap of {gap} m at {y} m");
+        }
+    }
+}
