@@ -1,5 +1,6 @@
 // integrate_gyroscopic: one thread changes the spin of one body with unequal moments of inertia, by the implicit
-// midpoint rule. With `is_from_start` velocities are changes since the step began, and `free` stays.
+// midpoint rule, and turns the body by the midpoint spin in place of the spin. With `is_from_start` velocities are
+// changes since the step began, and `free` stays.
 // Reads inertias. Writes bodies and free; one thread for each body.
 // Twin: src/kernels/integrate.rs.
 
@@ -44,10 +45,13 @@ fn spin_change(is_from_start: bool, steps: u32, inertia: Inertia, h: f32, spin: 
 // Square of the largest angle (rad) at which two Newton steps leave only rounding errors.
 const SLOW: f32 = 0.0625;
 
-// The change of the angular velocity w of a body that spins fast about its principal axes x, y, z. `square` is (h W)^2.
-fn fast_turn(is_from_start: bool, inertia: Inertia, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f) -> vec3f {
-    var h = pass_row.substep;
-    if square > 1.0 { h = pass_row.substep * inverse_sqrt(square); }
+// The change of the angular velocity w of a body that spins fast about its principal axes x, y, z, in the time `step`.
+// `square` is (h W)^2.
+fn fast_turn(
+    is_from_start: bool, inertia: Inertia, step: f32, square: f32, x: vec3f, y: vec3f, z: vec3f, spin: vec3f, w: vec3f,
+) -> vec3f {
+    var h = step;
+    if square > 1.0 { h = step * inverse_sqrt(square); }
     let change = spin_change(is_from_start, 4u, inertia, h, spin);
     let turn = x * change.x + y * change.y + z * change.z;
     // Axes that are not quite of unit length stretch a large change, always in the same direction. The scale brings the
@@ -72,9 +76,8 @@ fn turn_spin(is_from_start: bool, i: u32) {
     let y = turned(q, vec3f(0.0, 1.0, 0.0)) + vec3f(0.0, 1.0, 0.0);
     let z = turned(q, vec3f(0.0, 0.0, 1.0)) + vec3f(0.0, 0.0, 1.0);
 
-    // The free spin. Impulses come later.
-    var w = free[inertia.body].w;
-    if is_from_start { w = w + bodies[inertia.body].w; }
+    var w = bodies[inertia.body].w;
+    if is_from_start { w = free[inertia.body].w + w; }
     let spin = vec3f(dot3(x, w), dot3(y, w), dot3(z, w));
 
     // (h W)^2
@@ -84,14 +87,27 @@ fn turn_spin(is_from_start: bool, i: u32) {
     let angle = spin * pass_row.substep;
     let square = dot3(sizes, angle * angle);
 
+    // The time in which the rule turns a body by the angle x = h |w|: h tan(x/2)/(x/2).
+    let t = dot3(angle, angle);
+    let is_calm = 1.0 > larger(square, t);
+    let ratio = 1.0 + t * (8.3333336e-2 + t * (8.333334e-3 + t * (8.432540e-4 + t * (8.542769e-5 + t * 8.655504e-6))));
+    let step = pass_row.substep * select(1.0, ratio, is_calm);
+
     var turn: vec3f;
     if SLOW > square {
         // Only the change is turned back. Otherwise rounding of the axes would stretch a spin that nothing changes.
-        let change = spin_change(is_from_start, 2u, inertia, pass_row.substep, spin);
+        let change = spin_change(is_from_start, 2u, inertia, step, spin);
         turn = x * change.x + y * change.y + z * change.z;
     } else {
-        turn = fast_turn(is_from_start, inertia, square, x, y, z, spin, w);
+        turn = fast_turn(is_from_start, inertia, step, square, x, y, z, spin, w);
     }
-    if !is_from_start { free[inertia.body].w = w + turn; }
-    bodies[inertia.body].w += turn;
+
+    // A calm body goes back by the rotation that it has made with w, and takes Cayley's rotation about the midpoint.
+    let middle = (w + turn * 0.5) * (step * 0.5);
+    let scale = inverse_sqrt(1.0 + dot3(middle, middle));
+    let rotation = quat_mul(exp_rotation(w * -pass_row.substep), vec4f(middle * scale, scale));
+    let change = turn + select(vec3f(0.0), turned(rotation, w + turn), is_calm);
+    if !is_from_start { free[inertia.body].w += change; }
+    bodies[inertia.body].w += change;
+    if is_calm { bodies[inertia.body].dq = renormalized(quat_mul(rotation, bodies[inertia.body].dq)); }
 }

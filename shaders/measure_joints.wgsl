@@ -10,7 +10,7 @@ fn measure_joint(rules: Rules, i: u32) {
     let anchors = current_anchors(&pair, joint);
     var wanted = relative_velocity(rules, &pair, anchors.r_a, anchors.r_b);
     if rules.biased {
-        wanted += (joint.gap + relative_movement(&pair, joint.r_a, joint.r_b)) * pass_row.joint.bias_rate;
+        wanted += anchors.gap * pass_row.joint.bias_rate;
     }
     wanted = of_anchors(joint, wanted);
     note_correction(rules.measured, wanted.x, 1.0);

@@ -20,7 +20,7 @@ fn solve_joint(rules: Rules, i: u32) {
     var mass_scale = 1.0;
     var impulse_scale = 0.0;
     if rules.biased {
-        wanted += (joint.gap + relative_movement(&pair, joint.r_a, joint.r_b)) * pass_row.joint.bias_rate;
+        wanted += anchors.gap * pass_row.joint.bias_rate;
         mass_scale = pass_row.joint.mass_scale;
         impulse_scale = pass_row.joint.impulse_scale;
     }

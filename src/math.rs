@@ -163,7 +163,7 @@ impl Scalar for f64 {
 
 /// c[0] + s (c[1] + s (c[2] + ...)).
 #[inline(always)]
-fn polynomial<L: Lane>(s: L, c: [f64; 6]) -> L {
+pub fn polynomial<L: Lane>(s: L, c: [f64; 6]) -> L {
     let mut sum = L::constant(c[5]);
     for k in [4, 3, 2, 1, 0] {
         sum = L::constant(c[k]) + s * sum;

@@ -1,10 +1,15 @@
 // One joint, which keeps the anchors of two bodies together. Twins: src/kernels/joint.rs.
 
-struct Anchors { r_a: vec3f, r_b: vec3f }
+struct Anchors { r_a: vec3f, r_b: vec3f, gap: vec3f }
 
-// The present arms. They turned with their bodies since the step began.
+// The present arms, and the present gap from the anchor of a to that of b. Both arms end in the middle of the gap, so
+// that the impulses of a joint have no moment together.
 fn current_anchors(pair: ptr<function, Pair>, joint: Joint) -> Anchors {
-    return Anchors(joint.r_a + turned((*pair).a.dq, joint.r_a), joint.r_b + turned((*pair).b.dq, joint.r_b));
+    let turn_a = turned((*pair).a.dq, joint.r_a);
+    let turn_b = turned((*pair).b.dq, joint.r_b);
+    let gap = joint.gap + (((*pair).b.dp + turn_b) - ((*pair).a.dp + turn_a));
+    let half = gap * 0.5;
+    return Anchors((joint.r_a + turn_a) + half, (joint.r_b + turn_b) - half, gap);
 }
 
 // The column for the axis e of one body's contribution to G M^-1 G^T: (I^-1 (r x e)) x r.

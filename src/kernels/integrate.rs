@@ -7,7 +7,8 @@
 
 use super::rows::{Body, Damping, Free, Inertia, Mass, StepParams};
 use crate::math::{
-    Lane, Scalar, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, select3, turned, vec3,
+    Lane, Quat, Scalar, Vec3, cross3, dot3, exp_rotation, larger, polynomial, quat_mul, reciprocal, renormalized,
+    select3, turned, vec3,
 };
 
 /// Adds gravity and force. With `warm_start` it also applies the impulses from the end of the substep before.
@@ -185,6 +186,9 @@ fn fast_turn<S: Scalar>(
 /// multiplies the energy by eight, and implicit Euler loses most of it. The solution takes two Newton steps, or four
 /// for a fast spin, whose energy is also brought back.
 ///
+/// The body has turned by its spin w before, and now turns by m in place of w. With this rotation the rule keeps the
+/// angular momentum in the world, whatever impulses came before.
+///
 /// In the principal axes w_x' = a_x w_y w_z and so on, with a_x = (I_y - I_z)/I_x. If each w_i has a suitable unit, the
 /// three coefficients are 1 except for their signs, which are the same for all bodies. The accuracy of Newton's method
 /// therefore depends only on the direction and on one number, the angle h W with W² = |a_y a_z| w_x² + |a_z a_x| w_y² +
@@ -201,12 +205,12 @@ pub fn integrate_gyroscopic<S: Scalar>(
 ) {
     let motion = PrincipalMotion::of(from_start, params, inertia, body, free);
     let turn = if S::any(motion.is_slow()) {
-        motion.slow_turn(from_start, params, inertia)
+        motion.slow_turn(from_start, inertia)
     } else {
-        let PrincipalMotion { axes, w, spin, square } = motion;
-        fast_turn(from_start, inertia, params.substep, square, axes, spin, w)
+        let PrincipalMotion { axes, w, spin, square, step, .. } = motion;
+        fast_turn(from_start, inertia, step, square, axes, spin, w)
     };
-    add_turn(from_start, turn, body, free);
+    motion.apply(from_start, params, turn, body, free);
 }
 
 /// The same for bodies that spin slowly. Returns which do; the others get no valid spin.
@@ -219,29 +223,24 @@ pub fn integrate_slow_gyroscopic<L: Lane>(
     free: &mut Free<L>,
 ) -> L::Mask {
     let motion = PrincipalMotion::of(from_start, params, inertia, body, free);
-    add_turn(from_start, motion.slow_turn(from_start, params, inertia), body, free);
+    motion.apply(from_start, params, motion.slow_turn(from_start, inertia), body, free);
     motion.is_slow()
 }
 
-/// Adds the change of an angular velocity.
-#[inline(always)]
-fn add_turn<L: Lane>(from_start: bool, turn: Vec3<L>, body: &mut Body<L>, free: &mut Free<L>) {
-    if !from_start {
-        free.w += turn;
-    }
-    body.w += turn;
-}
-
 /// The motion of a body about its principal axes.
-struct PrincipalMotion<L> {
+struct PrincipalMotion<L: Lane> {
     /// The present axes.
     axes: [Vec3<L>; 3],
-    /// The free angular velocity. Impulses come later.
+    /// The angular velocity.
     w: Vec3<L>,
     /// The same, about the axes.
     spin: Vec3<L>,
     /// (h W)²
     square: L,
+    /// Whether the body turns by the midpoint spin: if it turns by less than 1 rad in a substep.
+    is_calm: L::Mask,
+    /// The time in which the rule turns a body by the angle x = h |w|: h tan(x/2)/(x/2), or h if that is not calm.
+    step: L,
 }
 
 impl<L: Lane> PrincipalMotion<L> {
@@ -254,13 +253,17 @@ impl<L: Lane> PrincipalMotion<L> {
         let x = turned(q, unit_x) + unit_x;
         let y = turned(q, unit_y) + unit_y;
         let z = turned(q, unit_z) + unit_z;
-        let w = if from_start { free.w + body.w } else { free.w };
+        let w = if from_start { free.w + body.w } else { body.w };
         let spin = vec3(dot3(x, w), dot3(y, w), dot3(z, w));
         let a = vec3((p.y - p.z) * k.x, (p.z - p.x) * k.y, (p.x - p.y) * k.z);
         let rates = vec3(a.y * a.z, a.z * a.x, a.x * a.y);
         let sizes = vec3(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
         let angle = spin * params.substep;
-        Self { axes: [x, y, z], w, spin, square: dot3(sizes, angle * angle) }
+        let (square, turned) = (dot3(sizes, angle * angle), dot3(angle, angle));
+        let is_calm = one.gt(larger(square, turned));
+        let ratio =
+            polynomial(turned, [1.0, 1.0 / 12.0, 1.0 / 120.0, 17.0 / 20160.0, 31.0 / 362_880.0, 691.0 / 79_833_600.0]);
+        Self { axes: [x, y, z], w, spin, square, is_calm, step: params.substep * L::select(one, ratio, is_calm) }
     }
 
     /// Whether two Newton steps suffice; false for NaN.
@@ -272,10 +275,29 @@ impl<L: Lane> PrincipalMotion<L> {
     /// The change of the angular velocity of a slow spin. Only the change is turned back. Otherwise rounding of the axes
     /// would stretch a spin that nothing changes.
     #[inline(always)]
-    fn slow_turn(&self, from_start: bool, params: &StepParams<L>, inertia: &Inertia<L>) -> Vec3<L> {
+    fn slow_turn(&self, from_start: bool, inertia: &Inertia<L>) -> Vec3<L> {
         let [x, y, z] = self.axes;
-        let change = spin_change(from_start, 2, inertia, params.substep, self.spin);
+        let change = spin_change(from_start, 2, inertia, self.step, self.spin);
         x * change.x + y * change.y + z * change.z
+    }
+
+    /// Adds the change of the angular velocity, about the axes of the body. A calm body goes back by the rotation that it
+    /// has made with w, and takes Cayley's rotation about the midpoint.
+    #[inline(always)]
+    fn apply(&self, from_start: bool, params: &StepParams<L>, turn: Vec3<L>, body: &mut Body<L>, free: &mut Free<L>) {
+        let (one, half) = (L::constant(1.0), L::constant(0.5));
+        let middle = (self.w + turn * half) * (self.step * half);
+        let scale = (one + dot3(middle, middle)).inverse_sqrt();
+        let there = Quat { axis: middle * scale, w: scale };
+        let rotation = quat_mul(exp_rotation(self.w * -params.substep), there);
+        let change = turn + select3(Vec3::default(), turned(rotation, self.w + turn), self.is_calm);
+        if !from_start {
+            free.w += change;
+        }
+        body.w += change;
+        let dq = renormalized(quat_mul(rotation, body.dq));
+        body.dq.axis = select3(body.dq.axis, dq.axis, self.is_calm);
+        body.dq.w = L::select(body.dq.w, dq.w, self.is_calm);
     }
 }
 

@@ -2,15 +2,19 @@
 //! and of the kernels `warm_start_joints` and `solve_joints`.
 
 use super::Rules;
-use super::pair::{apply_impulse, inverse_masses, note_correction, relative_movement, relative_velocity};
+use super::pair::{apply_impulse, inverse_masses, note_correction, relative_velocity};
 use super::rows::{Joint, Mass, Pair, StepParams};
 use crate::constants::STIFFENING;
 use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, select3, turned, vec3};
 
-/// The present arms. They turned with their bodies since the step began.
+/// The present arms, and the present gap from the anchor of a to that of b. Both arms end in the middle of the gap, so
+/// that the impulses of a joint have no moment together.
 #[inline(always)]
-pub fn current_anchors<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [Vec3<L>; 2] {
-    [joint.r_a + turned(pair.a.dq, joint.r_a), joint.r_b + turned(pair.b.dq, joint.r_b)]
+pub fn current_anchors<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> ([Vec3<L>; 2], Vec3<L>) {
+    let [turn_a, turn_b] = [turned(pair.a.dq, joint.r_a), turned(pair.b.dq, joint.r_b)];
+    let gap = joint.gap + ((pair.b.dp + turn_b) - (pair.a.dp + turn_a));
+    let half = gap * L::constant(0.5);
+    ([(joint.r_a + turn_a) + half, (joint.r_b + turn_b) - half], gap)
 }
 
 /// The column for the axis e of one body's contribution to G M⁻¹ Gᵀ: (I⁻¹ (r x e)) x r.
@@ -63,7 +67,7 @@ fn solve_block<L: Lane>(x: Vec3<L>, y: Vec3<L>, z: Vec3<L>, u: Vec3<L>) -> Vec3<
 /// Applies the carried impulse of a joint. Kernel `warm_start_joints`.
 #[inline(always)]
 pub fn warm_start_joint<L: Lane>(pair: &mut Pair<L>, joint: &Joint<L>, impulse: Vec3<L>) {
-    let [r_a, r_b] = current_anchors(pair, joint);
+    let ([r_a, r_b], _) = current_anchors(pair, joint);
     apply_impulse(Rules::default(), pair, r_a, r_b, impulse);
 }
 
@@ -77,7 +81,7 @@ pub fn solve_joint<L: Lane>(
     impulse: &mut Vec3<L>,
 ) {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let anchors = current_anchors(pair, joint);
+    let (anchors, gap) = current_anchors(pair, joint);
     let m = inverse_masses(pair);
     let x = joint_column(pair, anchors, vec3(one, zero, zero), m.x);
     let y = joint_column(pair, anchors, vec3(zero, one, zero), m.y);
@@ -88,7 +92,7 @@ pub fn solve_joint<L: Lane>(
     let mut wanted = relative_velocity(rules, pair, anchors[0], anchors[1]);
     let (mut mass_scale, mut impulse_scale) = (one, zero);
     if rules.biased {
-        wanted += (joint.gap + relative_movement(pair, joint.r_a, joint.r_b)) * params.joint.bias_rate;
+        wanted += gap * params.joint.bias_rate;
         mass_scale = params.joint.mass_scale;
         impulse_scale = params.joint.impulse_scale;
     }

@@ -12,7 +12,7 @@
 use super::Rules;
 use super::axis::{AxisMotion, Frames, NearerLimit, axis_motion, axis_speed, is_lock};
 use super::joint::current_anchors;
-use super::pair::{relative_movement, relative_velocity};
+use super::pair::relative_velocity;
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
 use crate::constants::MIN_PIVOT;
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, select3, turned, vec3};
@@ -220,7 +220,7 @@ pub fn turned_inertia<L: Lane>(begin: Sym3<L>, q: Quat<L>) -> Sym3<L> {
 #[inline(always)]
 pub fn anchor_motions<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> [AxisMotion<L>; 3] {
     let (zero, less) = (L::constant(0.0), L::constant(-1.0));
-    let [r_a, r_b] = current_anchors(pair, joint);
+    let ([r_a, r_b], _) = current_anchors(pair, joint);
     let mut motions = [vec3(less, zero, zero), vec3(zero, less, zero), vec3(zero, zero, less)]
         .map(|along| AxisMotion { along, ..AxisMotion::default() });
     for motion in &mut motions {
@@ -435,10 +435,10 @@ fn factor_blocks<L: Lane>(systems: &JointSystems, system: usize, relative_softne
 /// The velocity that the anchors of a joint lack. Kernel `measure_joints`.
 #[inline(always)]
 pub fn measure_joint<L: Lane>(rules: Rules, params: &StepParams<L>, pair: &mut Pair<L>, joint: &Joint<L>) -> Vec3<L> {
-    let [r_a, r_b] = current_anchors(pair, joint);
+    let ([r_a, r_b], gap) = current_anchors(pair, joint);
     let mut wanted = relative_velocity(rules, pair, r_a, r_b);
     if rules.biased {
-        wanted += (joint.gap + relative_movement(pair, joint.r_a, joint.r_b)) * params.joint.bias_rate;
+        wanted += gap * params.joint.bias_rate;
     }
     wanted = select3(wanted, Vec3::default(), joint.is_loose.gt(L::constant(0.0)));
     let Vec3 { x, y, z } = wanted;

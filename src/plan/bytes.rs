@@ -60,7 +60,9 @@ impl Pass {
                 let free = size_of::<FreeRow>() * if from_start { 1 } else { 2 };
                 rows.len() * (2 * VELOCITIES + size_of::<DampingRow>() + free)
             }
-            Kernel::IntegrateGyroscopic { .. } => rows.len() * (size_of::<InertiaRow>() + size_of::<FreeRow>() + BODY),
+            Kernel::IntegrateGyroscopic { .. } => {
+                rows.len() * (size_of::<InertiaRow>() + 2 * size_of::<FreeRow>() + 2 * BODY)
+            }
             Kernel::TurnInertias => rows.len() * (size_of::<TurningRow>() + BODY / 2 + MASS),
             Kernel::BeginSweep { .. } => 2 * size_of::<ConvergenceRow>(),
             // Reads and writes the previous values, and writes the start of the sweep.

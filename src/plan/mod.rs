@@ -207,7 +207,6 @@ impl StepPlan {
             if !problem.dampings.is_empty() {
                 self.over_colors(Kernel::DampVelocities { from_start }, block, bodies);
             }
-            self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &direct);
             if warm_start {
@@ -219,6 +218,7 @@ impl StepPlan {
             }
             self.sweeps(sweeps(config.iterations), biased);
             self.over_colors(Kernel::IntegratePositions { from_start }, block, bodies);
+            self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::TurnInertias, block, turning);
             self.over_colors(Kernel::BeginSystems, block, systems);
             self.sweeps(sweeps(config.relax), shared);

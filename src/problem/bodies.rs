@@ -130,7 +130,7 @@ pub fn follow_parabolas(world: &World, effort: &Effort, jointed: &[bool], dt: f3
         }
         let turn = w - body.allowed_spin(body.angular_velocity);
         row.dp = (Vec3::from_array(row.dp) - half * (v - v_0)).to_array();
-        // The spin of a body with unequal moments keeps its energy only on the path of the substeps.
+        // A body with unequal moments has turned by the midpoint spin.
         if turn != Vec3::ZERO && !body.mass.is_anisotropic() {
             let back = exp_rotation(math::Vec3::<f32>::load((turn * -half).to_array()));
             row.dq = renormalized(quat_mul(back, math::Quat::load(row.dq))).store();

@@ -113,6 +113,13 @@ fn joints_without_contacts_keep_the_momentum() {
     Group { one_in: 3, rate: 30, ..group() }.keeps(&["momentum"]);
 }
 
+/// Before: 6 of 40 worlds of hinges changed it by more than 1e-3.
+#[test]
+fn hinges_sliders_and_welds_keep_the_angular_momentum() {
+    let kinds = &[Kind::Hinge, Kind::Slider, Kind::Fixed];
+    Group { collides: &[false], ..Group::new(&[Family::Plain], kinds) }.keeps(&["spin"]);
+}
+
 #[test]
 fn no_world_that_nothing_drives_ends_above_its_start() {
     Group::new(&[Family::Plain], EVERY).keeps(&["finite", "lasting"]);

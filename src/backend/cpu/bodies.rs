@@ -260,13 +260,15 @@ impl Work for SpinWork<'_> {
             let inertia = inertia(moments, frame);
             let is_slow = integrate_slow_gyroscopic(self.from_start, &params, &inertia, &mut body, &mut free);
             let is_slow = L::select(L::constant(0.0), L::constant(1.0), is_slow).store();
-            let (velocities, free) = (velocity_rows(body.v, body.w), velocity_rows(free.v, free.w));
+            let (velocities, movements) = (velocity_rows(body.v, body.w), movement_rows(&body));
+            let free = velocity_rows(free.v, free.w);
             for (lane, (slot, row)) in rows.iter().enumerate() {
                 if is_slow.0[lane] > 0.0 {
                     let slot = *slot as usize;
                     // SAFETY: as above.
                     unsafe {
-                        self.bodies.slice(slot..slot + 1)[0].velocity = velocities[lane];
+                        let state = &mut self.bodies.slice(slot..slot + 1)[0];
+                        (state.velocity, state.movement) = (velocities[lane], movements[lane]);
                         self.free.slice(slot..slot + 1)[0] = free[lane];
                     }
                 } else {
@@ -295,6 +297,7 @@ impl SpinWork<'_> {
             &mut free,
         );
         state.velocity = Row8(velocity_numbers(body.v, body.w));
+        state.movement = Row8(movement_numbers(&body));
         *row = Row8(velocity_numbers(free.v, free.w));
     }
 }
@@ -379,6 +382,12 @@ pub(super) fn velocity_rows<L: Lanes>(v: Vec3<L>, w: Vec3<L>) -> [Row8; WIDTH] {
 
 #[inline(always)]
 fn movement_rows<L: Lanes>(body: &Body<L>) -> [Row8; WIDTH] {
+    L::scattered(movement_numbers(body))
+}
+
+/// The numbers of a row of movements.
+#[inline(always)]
+fn movement_numbers<L: Lane>(body: &Body<L>) -> [L; 8] {
     let (p, q) = (body.dp, body.dq);
-    L::scattered([p.x, p.y, p.z, L::constant(0.0), q.axis.x, q.axis.y, q.axis.z, q.w])
+    [p.x, p.y, p.z, L::constant(0.0), q.axis.x, q.axis.y, q.axis.z, q.w]
 }
