@@ -108,13 +108,16 @@ pub(super) struct Sides {
     pub is_free: bool,
 }
 
+/// Finds the normal nearest to a direction at some points of a triangle. Returns `None` if nothing opens its cone
+/// there.
+type Open<'a> = &'a mut dyn FnMut(&FacetCone, &[Corner], Vec3, &mut RimScratch) -> Option<Vec3>;
+
 /// The normals of contacts with a triangle.
 pub(super) struct Normals<'a> {
     /// Those of its sides; `None` for a triangle with two sides.
     pub sides: &'a dyn Fn() -> Option<Sides>,
-    /// Finds the normal nearest to a direction at some points of the triangle. Returns `None` if nothing opens its cone
-    /// there.
-    pub open: &'a mut dyn FnMut(&FacetCone, &[Corner], Vec3, &mut RimScratch) -> Option<Vec3>,
+    /// Adds normals at free edges.
+    pub open: Open<'a>,
     /// See [`Facet::peak`].
     pub peak: &'a dyn Fn(usize, Vec3) -> Option<bool>,
 }
@@ -223,17 +226,18 @@ pub(super) fn triangle_contact(
         let cone = FacetCone::new(&cone);
         let is_in_front = cone.project_local_normal_mut(&mut normal);
         let is_turned = cone.is_in_front(direction) && !FacetCone::is_same(normal, direction);
-        let corners_along = [a, b, c].map(|at| direction.dot(at));
-        let highest = (0..3).max_by(|&i, &j| corners_along[i].total_cmp(&corners_along[j])).unwrap_or(0);
-        let at_peak = || peak(highest, direction).filter(|_| near.contains_local_point([a, b, c][highest]));
+        let vertices = [a, b, c];
+        let along = |&i: &usize| direction.dot(vertices[i]);
+        let highest = (0..3).max_by(|i, j| along(i).total_cmp(&along(j))).unwrap_or(0);
+        let top = vertices[highest];
+        let at_peak = || peak(highest, direction).filter(|_| near.contains_local_point(top));
         if let Some(is_first) = is_turned.then(at_peak).flatten() {
             // All triangles at a peak touch the solid there.
-            let on_solid = [a, b, c][highest] + direction * distance;
-            let on_surface = convex.pose.inverse_transform_point(on_solid);
+            let on_surface = convex.pose.inverse_transform_point(top + direction * distance);
             found.local_n1 = direction;
             found.local_n2 = convex.pose.rotation.inverse() * -direction;
             let unknown = PackedFeatureId::UNKNOWN;
-            let point = TrackedContact::new([a, b, c][highest], on_surface, unknown, unknown, distance);
+            let point = TrackedContact::new(top, on_surface, unknown, unknown, distance);
             return is_first.then(|| found.points.push(point));
         }
         let opens = is_free && is_turned;
