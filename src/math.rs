@@ -161,7 +161,7 @@ impl Scalar for f64 {
     }
 }
 
-/// c[0] + s (c[1] + s (c[2] + ...)).
+/// The polynomial in s with these coefficients, that of the lowest power first.
 #[inline(always)]
 pub fn polynomial<L: Lane>(s: L, c: [f64; 6]) -> L {
     let mut sum = L::constant(c[5]);
