@@ -48,17 +48,18 @@ fn a_tumbling_body_flips_on_time_for_twenty_seconds(open: Open) {
     below(&format!("{name}, momentum"), tumble.momentum, 1e-4);
 }
 
-/// The limits of the hard case `flip`. Sums of velocities instead of changes gained 1.4e-5 with 32 substeps, 6.7e-5 with 128 and 5.5e-4
-/// with 512. Measured: 4e-6 and less from 32 on.
+/// The limits of the hard case `flip`, except that 512 substeps round 1,024 rotations a step. Sums of velocities instead of changes gained
+/// 1.4e-5 with 32 substeps, 6.7e-5 with 128 and 5.5e-4 with 512. Measured: 5.3e-6 and 6.0e-6 with 8, 9.3e-6 and 1.3e-5 with 512.
 fn energy_and_flips_hold_for_every_number_of_substeps() {
     for substeps in [8, 32, 128, 512] {
         let reference = || Box::new(Reference::<f32>::new());
+        let most = if substeps < 512 { 1e-5 } else { 2e-5 };
         let slow = tumble_by(substeps, reference(), 0.01);
         holds(&format!("{substeps} substeps, first flip"), slow.flips[0], 0.5 * flip_time(0.01), 0.005);
-        below(&format!("{substeps} substeps, energy"), slow.energy, 1e-5);
+        below(&format!("{substeps} substeps, energy"), slow.energy, most);
         let fast = tumble_by(substeps, reference(), 1.0);
         holds(&format!("{substeps} substeps, between flips"), fast.between(), flip_time(1.0), 0.005);
-        below(&format!("{substeps} substeps, energy"), fast.energy, 1e-5);
+        below(&format!("{substeps} substeps, energy"), fast.energy, most);
     }
 }
 
