@@ -87,10 +87,10 @@ fn turn_spin(is_from_start: bool, i: u32) {
     let angle = spin * pass_row.substep;
     let square = dot3(sizes, angle * angle);
 
-    // The time in which the rule turns a body by the angle x = h |w|: h tan(x/2)/(x/2).
-    let t = dot3(angle, angle);
-    let is_calm = 1.0 > larger(square, t);
-    let ratio = 1.0 + t * (8.3333336e-2 + t * (8.333334e-3 + t * (8.432540e-4 + t * (8.542769e-5 + t * 8.655504e-6))));
+    // The time in which the rule turns a body by the angle x = h |w|: h tan(x/2)/(x/2), with s = x^2.
+    let s = dot3(angle, angle);
+    let is_calm = 1.0 > larger(square, s);
+    let ratio = 1.0 + s * (8.3333336e-2 + s * (8.333334e-3 + s * (8.432540e-4 + s * (8.542769e-5 + s * 8.655504e-6))));
     let step = pass_row.substep * select(1.0, ratio, is_calm);
 
     var turn: vec3f;

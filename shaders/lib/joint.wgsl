@@ -5,11 +5,11 @@ struct Anchors { r_a: vec3f, r_b: vec3f, gap: vec3f }
 // The present arms, and the present gap from the anchor of a to that of b. Both arms end in the middle of the gap, so
 // that the impulses of a joint have no moment together.
 fn current_anchors(pair: ptr<function, Pair>, joint: Joint) -> Anchors {
-    let turn_a = turned((*pair).a.dq, joint.r_a);
-    let turn_b = turned((*pair).b.dq, joint.r_b);
-    let gap = joint.gap + (((*pair).b.dp + turn_b) - ((*pair).a.dp + turn_a));
+    let gap = joint.gap + relative_movement(pair, joint.r_a, joint.r_b);
     let half = gap * 0.5;
-    return Anchors((joint.r_a + turn_a) + half, (joint.r_b + turn_b) - half, gap);
+    let r_a = joint.r_a + turned((*pair).a.dq, joint.r_a);
+    let r_b = joint.r_b + turned((*pair).b.dq, joint.r_b);
+    return Anchors(r_a + half, r_b - half, gap);
 }
 
 // The column for the axis e of one body's contribution to G M^-1 G^T: (I^-1 (r x e)) x r.

@@ -63,8 +63,9 @@ pub(super) fn composite_contacts(
                 beside.open(composite, cone, points.iter().map(|point| point.0 + middle), d, rim)
             };
             let sides = || Some(Sides { cone: facet.cone()?, is_free: facet.free_edges().contains(&true) });
-            let sides = Normals { sides: &sides, open: &mut open, peak: &|corner, d| facet.peak(triangle, corner, d) };
-            if triangle_contact(corners, sides, convex, &near, search, buffers, &mut found).is_some() {
+            let peak = |corner, d| facet.peak(triangle, corner, d);
+            let normals = Normals { sides: &sides, open: &mut open, peak: &peak };
+            if triangle_contact(corners, normals, convex, &near, search, buffers, &mut found).is_some() {
                 found.points.iter_mut().for_each(|point| point.local_p1 += middle);
             }
         } else {
@@ -230,8 +231,8 @@ pub(super) fn triangle_contact(
         let along = |&i: &usize| direction.dot(vertices[i]);
         let highest = (0..3).max_by(|i, j| along(i).total_cmp(&along(j))).unwrap_or(0);
         let top = vertices[highest];
-        let at_peak = || peak(highest, direction).filter(|_| near.contains_local_point(top));
-        if let Some(is_first) = is_turned.then(at_peak).flatten() {
+        let may_be_peak = is_turned && near.contains_local_point(top);
+        if let Some(is_first) = may_be_peak.then(|| peak(highest, direction)).flatten() {
             // All triangles at a peak touch the solid there.
             let on_surface = convex.pose.inverse_transform_point(top + direction * distance);
             found.local_n1 = direction;

@@ -75,18 +75,14 @@ impl Facet<'_> {
         // The diagonal belongs to both triangles of a cell.
         if is_first { [column == 0, false, row == 0] } else { [row == rows - 1, column == field.ncols() - 1, false] }
     }
-}
 
-impl Facet<'_> {
     /// Whether a corner of this triangle is a peak in a direction: triangles surround the corner, and all lie below it.
     /// The direction is then a normal of the surface there. The cone of a triangle lacks it, because the cone has only
     /// the triangles at its edges. If so, tells whether this is the first of the triangles at the corner.
     pub fn peak(self, triangle: &Triangle, corner: usize, d: Vec3) -> Option<bool> {
         let at = triangle.vertices()[corner];
-        let size = [1, 2]
-            .map(|i| triangle.vertices()[(corner + i) % 3].distance(at))
-            .into_iter()
-            .fold(f32::INFINITY, f32::min);
+        let [one, other] = [1, 2].map(|i| triangle.vertices()[(corner + i) % 3].distance(at));
+        let size = one.min(other);
         let (mut is_below, mut first, mut open) = (true, self.number, Vec3::ZERO);
         each_triangle(self.composite, &Aabb::from_half_extents(at, Vec3::splat(EXACT * size)), |facet, other| {
             let corners = other.vertices();

@@ -237,7 +237,7 @@ struct PrincipalMotion<L: Lane> {
     spin: Vec3<L>,
     /// (h W)²
     square: L,
-    /// Whether the body turns by the midpoint spin: if it turns by less than 1 rad in a substep.
+    /// Whether the body turns by the midpoint spin: if both h W and h |w| are below 1 rad.
     is_calm: L::Mask,
     /// The time in which the rule turns a body by the angle x = h |w|: h tan(x/2)/(x/2), or h if that is not calm.
     step: L,
@@ -259,10 +259,12 @@ impl<L: Lane> PrincipalMotion<L> {
         let rates = vec3(a.y * a.z, a.z * a.x, a.x * a.y);
         let sizes = vec3(larger(rates.x, -rates.x), larger(rates.y, -rates.y), larger(rates.z, -rates.z));
         let angle = spin * params.substep;
-        let (square, turned) = (dot3(sizes, angle * angle), dot3(angle, angle));
-        let is_calm = one.gt(larger(square, turned));
-        let ratio =
-            polynomial(turned, [1.0, 1.0 / 12.0, 1.0 / 120.0, 17.0 / 20160.0, 31.0 / 362_880.0, 691.0 / 79_833_600.0]);
+        let (square, x_square) = (dot3(sizes, angle * angle), dot3(angle, angle));
+        let is_calm = one.gt(larger(square, x_square));
+        let ratio = polynomial(
+            x_square,
+            [1.0, 1.0 / 12.0, 1.0 / 120.0, 17.0 / 20160.0, 31.0 / 362_880.0, 691.0 / 79_833_600.0],
+        );
         Self { axes: [x, y, z], w, spin, square, is_calm, step: params.substep * L::select(one, ratio, is_calm) }
     }
 

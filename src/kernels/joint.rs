@@ -2,7 +2,7 @@
 //! and of the kernels `warm_start_joints` and `solve_joints`.
 
 use super::Rules;
-use super::pair::{apply_impulse, inverse_masses, note_correction, relative_velocity};
+use super::pair::{apply_impulse, inverse_masses, note_correction, relative_movement, relative_velocity};
 use super::rows::{Joint, Mass, Pair, StepParams};
 use crate::constants::STIFFENING;
 use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, select3, turned, vec3};
@@ -11,10 +11,10 @@ use crate::math::{Lane, Vec3, cross3, dot3, reciprocal, select3, turned, vec3};
 /// that the impulses of a joint have no moment together.
 #[inline(always)]
 pub fn current_anchors<L: Lane>(pair: &Pair<L>, joint: &Joint<L>) -> ([Vec3<L>; 2], Vec3<L>) {
-    let [turn_a, turn_b] = [turned(pair.a.dq, joint.r_a), turned(pair.b.dq, joint.r_b)];
-    let gap = joint.gap + ((pair.b.dp + turn_b) - (pair.a.dp + turn_a));
+    let gap = joint.gap + relative_movement(pair, joint.r_a, joint.r_b);
     let half = gap * L::constant(0.5);
-    ([(joint.r_a + turn_a) + half, (joint.r_b + turn_b) - half], gap)
+    let [r_a, r_b] = [joint.r_a + turned(pair.a.dq, joint.r_a), joint.r_b + turned(pair.b.dq, joint.r_b)];
+    ([r_a + half, r_b - half], gap)
 }
 
 /// The column for the axis e of one body's contribution to G M⁻¹ Gᵀ: (I⁻¹ (r x e)) x r.

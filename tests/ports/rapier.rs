@@ -200,7 +200,7 @@ fn a_chain_of_twelve_hinges_stays_together_and_gains_no_energy() {
         motion = motion.max(simulation.world.kinetic_energy());
     });
     assert!(gap < 0.01, "{gap} m");
-    // Velocities of jointed bodies are half a substep ahead.
+    // The places of jointed bodies are half a substep ahead of their velocities.
     assert!(most < start + 1e-3 * motion, "{} J gained, of {motion} J in motion", most - start);
 }
 
