@@ -51,6 +51,19 @@ fn angles_of(q: vec4f) -> Angles {
     );
 }
 
+struct Elevation { value: f32, direction: vec3f }
+
+// The angle of a height, and the direction of its rate, from the direction of the height. At a pole the direction is
+// `axis`.
+fn elevation(height: f32, direction: vec3f, axis: vec3f) -> Elevation {
+    // The direction of a height is as long as the cosine of its angle.
+    let square = dot3(direction, direction);
+    let inverse = inverse_sqrt(larger(square, MIN_COSINE));
+    let tangent = height * inverse;
+    let value = tangent * arc_over_tangent(tangent * tangent);
+    return Elevation(value, select(axis, direction * inverse, square > MIN_COSINE));
+}
+
 // atan(t)/t from the square of t.
 fn arc_over_tangent(square: f32) -> f32 {
     let inverse = inverse_sqrt(square);

@@ -25,6 +25,14 @@ fn angle_motion(pair: ptr<function, Pair>, joint: Joint, axis: Axis) -> AngleMot
         direction = select(direction, angles.directions[i], is_beyond);
         last -= 1.0;
     }
+    if -8.5 > axis.coordinate {
+        let is_third = -9.5 > axis.coordinate;
+        let height = select(angles.values[6], angles.values[7], is_third);
+        let unit = select(vec3f(0.0, 1.0, 0.0), vec3f(0.0, 0.0, 1.0), is_third);
+        let angle = elevation(height, select(angles.directions[6], angles.directions[7], is_third), unit);
+        value = angle.value;
+        direction = angle.direction;
+    }
     // A twist continues beyond pi.
     let is_twist = axis.coordinate > -1.5;
     let moved = value - axis.start;

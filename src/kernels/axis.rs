@@ -66,6 +66,19 @@ impl<'a, L: Lane> Frames<'a, L> {
             value = L::select(value, values[i], is_beyond);
             direction = select3(direction, directions[i], is_beyond);
         }
+        let is_elevation = L::constant(-0.5 - angles::ELEVATION as f64).gt(axis.coordinate);
+        if L::any(is_elevation) {
+            let (zero, one) = (L::constant(0.0), L::constant(1.0));
+            let is_third = L::constant(-1.5 - angles::ELEVATION as f64).gt(axis.coordinate);
+            let [second, third] = [angles::HEIGHT, angles::HEIGHT + 1];
+            let (angle, about) = angles::elevation(
+                L::select(values[second], values[third], is_third),
+                select3(directions[second], directions[third], is_third),
+                select3(vec3(zero, one, zero), vec3(zero, zero, one), is_third),
+            );
+            value = L::select(value, angle, is_elevation);
+            direction = select3(direction, about, is_elevation);
+        }
         // A twist continues beyond pi.
         let turn = L::constant(std::f64::consts::TAU);
         let is_twist = axis.coordinate.gt(L::constant(-1.5));

@@ -1,6 +1,6 @@
 //! Angles of the frames of a joint. Twins of `shaders/lib/angles.wgsl`.
 
-use super::{Lane, Quat, Vec3, larger, reciprocal, vec3};
+use super::{Lane, Quat, Vec3, dot3, larger, reciprocal, select3, vec3};
 
 /// The number of the twist about the first axis, from -pi to pi.
 pub const TWIST: usize = 0;
@@ -12,8 +12,10 @@ pub const HALVES: usize = 3;
 /// The number of the first of the heights of the first axis of a above the plane of the first axis of b and the third,
 /// and of b and the second.
 pub const HEIGHT: usize = 6;
-/// How many there are.
+/// How many [`Angles`] has.
 pub const COUNT: usize = 8;
+/// The number of the first of the angles of the two heights: see [`elevation`].
+pub const ELEVATION: usize = COUNT;
 
 /// Coordinates of a rotation q of frame a in frame b, and the directions whose products with the spin of a against b, in
 /// frame b, are their rates.
@@ -79,6 +81,18 @@ impl<L: Lane> Angles<L> {
     }
 }
 
+/// The angle of a height, from -pi/2 to pi/2, and the direction of its rate, from the direction of the height. At a pole
+/// the direction is `axis`.
+#[inline(always)]
+pub fn elevation<L: Lane>(height: L, direction: Vec3<L>, axis: Vec3<L>) -> (L, Vec3<L>) {
+    // The direction of a height is as long as the cosine of its angle.
+    let square = dot3(direction, direction);
+    let least = L::constant(MIN_COSINE);
+    let inverse = larger(square, least).inverse_sqrt();
+    let tangent = height * inverse;
+    (tangent * arc_over_tangent(tangent * tangent), select3(axis, direction * inverse, square.gt(least)))
+}
+
 /// atan(t)/t from the square of t, to 4e-7.
 #[inline(always)]
 fn arc_over_tangent<L: Lane>(square: L) -> L {
@@ -116,6 +130,18 @@ mod tests {
                 let off = [found - twist, y - swing[0], z - swing[1]];
                 assert!(off.iter().all(|off| off.abs() < 2e-6), "{swing:?} {twist}: {off:?}");
             }
+        }
+    }
+
+    #[test]
+    fn the_elevation_of_an_axis_is_its_angle_above_a_plane() {
+        for (y, z, twist) in [(0.3, -0.2, 0.4), (2.8, 0.4, -1.0), (-3.1, -0.6, 2.0), (0.5, 1.57, 0.0)] {
+            let q =
+                glam::DQuat::from_rotation_y(y) * glam::DQuat::from_rotation_z(z) * glam::DQuat::from_rotation_x(twist);
+            let Angles { values, directions } = Angles::of(lane(q));
+            let (found, d) = elevation(values[HEIGHT + 1], directions[HEIGHT + 1], vec3(0.0, 0.0, 1.0));
+            assert!((found - z).abs() < 1e-4, "{y} {z}: {found}");
+            assert!((dot3(d, d) - 1.0).abs() < 1e-6 && (d.y * d.y) < 1e-9, "{y} {z}: {d:?}");
         }
     }
 

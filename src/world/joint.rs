@@ -73,9 +73,12 @@ pub struct Joint {
     pub frame_b: Quat,
     /// Which positions the anchor of a can take.
     pub linear: Linear,
-    /// Which angles a can take. The first angle is the twist about the first axis, from -pi to pi. The other two angles
-    /// are the components, along the second and third axis, of the rotation vector that turns the first axis of b into
-    /// the first axis of a.
+    /// Which angles a can take. One angle is the twist about its axis, from -pi to pi. The other two angles are the
+    /// components, along their axes, of the rotation vector that turns the axis of the twist in b into that in a. The
+    /// twist is about the first axis, unless another axis is bounded less than both others: about a free axis if the
+    /// others have limits or locks, and about an axis with limits if the others are locked. If the first angle and one
+    /// other are free, the angle with limits is that of the first axis of a above the plane of b that the free one
+    /// turns it in, from -pi/2 to pi/2.
     pub angular: [Axis; 3],
     /// Whether the two bodies still collide with each other.
     pub collide: bool,
@@ -347,20 +350,43 @@ impl Joint {
         self.linear == Linear::Axes([Axis::LOCKED; 3])
     }
 
-    /// Whether the first axis of a may swing against that of b.
-    pub(crate) fn swings(&self) -> bool {
-        self.angular[1..].iter().any(|axis| axis.bounds != Bounds::Locked)
+    /// The axis of the twist, which passes half a turn without a jump: the axis that is bounded least, or the first of
+    /// several, and the first of all if it counts turns.
+    pub(crate) fn twist_axis(&self) -> usize {
+        let freedom = |axis: &Axis| match axis.bounds {
+            Bounds::Free => 2,
+            Bounds::Between { .. } => 1,
+            Bounds::Locked => 0,
+        };
+        let [first, others @ ..] = self.angular.each_ref().map(freedom);
+        match others {
+            _ if self.angular[0].counts_turns() => 0,
+            [y, z] if y > first.max(z) => 1,
+            [y, z] if z > first.max(y) => 2,
+            _ => 0,
+        }
     }
 
-    /// The coordinate of an angle, by its number in [`Angles`](angles::Angles). Where nothing swings, none jumps.
+    /// Whether the axis of the twist may swing in a against that in b.
+    pub(crate) fn swings(&self) -> bool {
+        let twist = self.twist_axis();
+        (0..3).any(|angle| angle != twist && self.angular[angle].bounds != Bounds::Locked)
+    }
+
+    /// The coordinate of an angle, by its number in [`Angles`](angles::Angles) of frames whose first axis is that of
+    /// the twist. Where nothing swings, none jumps.
     pub(crate) fn coordinate(&self, angle: usize) -> usize {
-        let needs_lock = |angle: usize| self.swings() && self.angular[angle].bounds == Bounds::Locked;
-        match angle {
-            0 if !needs_lock(0) => angles::TWIST,
-            _ if !needs_lock(angle) => angles::SWING + angle - 1,
+        let (twist, swings) = (self.twist_axis(), self.swings());
+        let needs_lock = |angle: usize| swings && self.angular[angle].bounds == Bounds::Locked;
+        let are_others_free = || (0..3).all(|other| other == angle || self.angular[other].bounds == Bounds::Free);
+        let is_limited = matches!(self.angular[angle].bounds, Bounds::Between { .. });
+        match (angle + 3 - twist) % 3 {
+            0 if !needs_lock(angle) => angles::TWIST,
+            place if is_limited && are_others_free() => angles::ELEVATION + place - 1,
+            place if !needs_lock(angle) => angles::SWING + place - 1,
             // A swing without twist has no component of its quaternion along a locked axis.
-            _ if needs_lock(0) => angles::HALVES + angle,
-            _ => angles::HEIGHT + angle - 1,
+            place if needs_lock(twist) => angles::HALVES + place,
+            place => angles::HEIGHT + place - 1,
         }
     }
 

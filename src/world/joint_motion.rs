@@ -10,7 +10,7 @@ use super::joint_axis::{Axis, Bounds, Drive};
 use super::limits::{MAX_LENGTH, MAX_SPEED, check_rotation};
 use crate::error::{Result, ensure};
 use crate::math::Quat as Rotation;
-use crate::math::angles::Angles;
+use crate::math::angles::{self, Angles};
 use crate::math::rotation::{product, unit};
 
 /// Position and speed of body a against body b along each axis of a joint: three translations, then three rotations.
@@ -28,19 +28,19 @@ use crate::math::rotation::{product, unit};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotion {
-    /// Positions (m), then angles (rad). The first angle is the twist about the first axis, from -pi to pi: a world does
-    /// not know how often a joint has turned. The other two are the components of the rotation vector that turns the
-    /// first axis. If the joint lets the first axis swing, a locked angle is twice a component of the quaternion or the
-    /// height of the first axis above a plane: zero in the same places, and without a jump at half a turn. The first
-    /// position is the distance of the anchors if the joint restricts the distance.
+    /// Positions (m), then angles (rad), as [`Joint::angular`] defines them. A twist is from -pi to pi: a world does not
+    /// know how often a joint has turned. If the joint lets the axis of the twist swing, a locked angle is twice a
+    /// component of the quaternion or the height of that axis above a plane: zero in the same places, and without a jump
+    /// at half a turn. The first position is the distance of the anchors if the joint restricts the distance.
     pub position: [f32; 6],
     /// Rates of the positions and angles (m/s, rad/s).
     pub speed: [f32; 6],
     /// World direction of each axis. The joint pushes body a along it, or turns body a about it.
     pub(crate) direction: [Vec3; 6],
-    /// World rotation of the frame on a, with the sign for which its rotation in the frame on b has w >= 0.
+    /// World rotation of the frame on a, with the axis of the twist first, and with the sign for which its rotation in
+    /// the frame on b has w >= 0.
     pub(crate) frame_a: Quat,
-    /// World rotation of the frame on b.
+    /// World rotation of the frame on b, with the axis of the twist first.
     pub(crate) frame_b: Quat,
     /// The angles as they are between frames (rad), without turns that were counted.
     pub(crate) start: [f32; 3],
@@ -52,6 +52,10 @@ pub struct JointMotion {
 
 /// The largest limit of an angle that counts turns (turns). There, an angle is rounded to 0.0005 rad.
 const MAX_TURNS: f32 = 1000.0;
+
+/// The rotations that turn the first axis into each of the three, the second into the one after it.
+const TWIST_FRAMES: [Quat; 3] =
+    [Quat::IDENTITY, Quat::from_xyzw(0.5, 0.5, 0.5, 0.5), Quat::from_xyzw(-0.5, -0.5, -0.5, 0.5)];
 
 /// A shorter distance than this has no direction (m).
 pub(crate) const MIN_DISTANCE: f32 = 1e-6;
@@ -84,19 +88,28 @@ impl World {
         };
         let offset = anchor_a - anchor_b;
         let frame_b = product(b.map_or(Quat::IDENTITY, |b| b.rotation), joint.frame_b);
-        let frame_a = product(a.rotation, joint.frame_a);
-        let relative = unit(product(frame_b.inverse(), frame_a));
         let axes_b = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| frame_b * e);
+        // The first axis of these frames is that of the twist.
+        let turn = TWIST_FRAMES[joint.twist_axis()];
+        let [frame_a, frame_b] = [product(a.rotation, joint.frame_a), frame_b].map(|frame| product(frame, turn));
+        let relative = unit(product(frame_b.inverse(), frame_a));
         let sign = if relative.w < 0.0 { -1.0 } else { 1.0 };
         let (frame_a, relative) = (frame_a * sign, relative * sign);
         let Angles { values, directions } = Angles::of(Rotation::load(relative.to_array()));
-        let coordinates = [0, 1, 2].map(|angle| joint.coordinate(angle));
+        let angles = [0, 1, 2].map(|angle| match joint.coordinate(angle) {
+            elevation @ angles::ELEVATION.. => {
+                let place = elevation - angles::ELEVATION;
+                let axis = Rotation::load([Vec3::Y, Vec3::Z][place].extend(0.0).to_array()).axis;
+                angles::elevation(values[angles::HEIGHT + place], directions[angles::HEIGHT + place], axis)
+            }
+            number => (values[number], directions[number]),
+        });
 
         let mut direction = [Vec3::ZERO; 6];
         direction[..3].copy_from_slice(&axes_b);
         direction[3..].copy_from_slice(&axes_b);
         if joint.swings() {
-            direction[3..].copy_from_slice(&coordinates.map(|i| frame_b * Vec3::from_array(directions[i].store())));
+            direction[3..].copy_from_slice(&angles.map(|(_, direction)| frame_b * Vec3::from_array(direction.store())));
         }
         let mut position = [0.0; 6];
         for (position, axis) in position.iter_mut().zip(axes_b) {
@@ -108,7 +121,7 @@ impl World {
             (direction[0], position[0]) = (along, distance);
             (direction[1], direction[2], position[1], position[2]) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
         }
-        let start = coordinates.map(|i| values[i]);
+        let start = angles.map(|(value, _)| value);
         position[3..].copy_from_slice(&start);
         let velocity = a.linear_velocity + a.angular_velocity.cross(anchor_a - a.center_of_mass())
             - b.map_or(Vec3::ZERO, |b| b.linear_velocity + b.angular_velocity.cross(anchor_a - b.center_of_mass()));

@@ -35,6 +35,8 @@ tests! {
         a_fixed_cantilever_keeps_its_angle,
         a_hinge_about_any_axis_of_a_joint_turns_on_with_its_load,
         a_hinge_swings_with_the_period_of_a_physical_pendulum,
+        a_free_angle_turns_on_while_the_others_keep_their_limits,
+        an_arm_keeps_the_limit_of_its_height_all_around,
         a_joint_with_two_free_angles_keeps_the_third_through_half_a_turn,
         a_limit_stands_where_it_is_however_far_the_other_one_is,
         a_motor_is_no_stronger_than_its_largest_torque,
@@ -166,6 +168,62 @@ fn a_joint_with_two_free_angles_keeps_the_third_through_half_a_turn(open: Open) 
         }
         assert!(off < 2e-3 && most < 1.01, "{locked}: {off} rad, {most} of the energy");
         assert!(swing > 3.0, "{locked}: {swing}");
+    }
+}
+
+/// A cube turns about the free axis of its joint. Limits keep this axis close to where it was, or a limit and a lock.
+fn a_free_angle_turns_on_while_the_others_keep_their_limits(open: Open) {
+    let limit = 0.3;
+    let other_axes = [[Axis::limited(-limit, limit); 2], [Axis::LOCKED, Axis::limited(-limit, limit)]];
+    for (free, [next, last]) in (0..3).flat_map(|free| other_axes.map(|other| (free, other))) {
+        let [along, second] = [0, 2].map(|i| Vec3::AXES[(free + i) % 3]);
+        let mut angular = [Axis::FREE; 3];
+        (angular[(free + 1) % 3], angular[(free + 2) % 3]) = (next, last);
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        let cube =
+            Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).velocity(Vec3::ZERO, along * 10.0 + second * 4.0);
+        let cube = world.insert(cube);
+        world.insert_joint(Joint::to_world(cube, Vec3::ZERO, Vec3::ZERO).generic([Axis::LOCKED; 3], angular));
+        let mut simulation = simulate(world, open);
+        let begin = simulation.world.kinetic_energy();
+        let (mut off, mut tilt, mut most) = (0.0_f32, 0.0_f32, 0.0_f64);
+        steps(&mut simulation, 3.0, |_, world| {
+            let now = world.bodies[0].rotation * along;
+            // The swing of the free axis along the axis of a lock.
+            off = off.max(if next == Axis::LOCKED { now.dot(second).abs() } else { 0.0 });
+            tilt = tilt.max(now.angle_between(along));
+            most = most.max(world.kinetic_energy() / begin);
+        });
+        let spin = simulation.world.bodies[0].angular_velocity.dot(along);
+        assert!((limit - 0.01..2.0_f32.sqrt() * limit + 0.01).contains(&tilt), "{free}, {next:?}: tilt {tilt}");
+        assert!(off < 2e-3 && spin > 5.0 && most < 1.001, "{free}, {next:?}: {off} rad, {spin} rad/s, {most}");
+    }
+}
+
+/// An arm turns about one axis without end, and its limits keep it close to the plane across this axis.
+fn an_arm_keeps_the_limit_of_its_height_all_around(open: Open) {
+    let limit = 0.3;
+    for limited in [1, 2] {
+        let mut angular = [Axis::FREE; 3];
+        angular[limited] = Axis::limited(-limit, limit);
+        let (around, up) = (Vec3::AXES[3 - limited], Vec3::AXES[limited]);
+        let spin = around * 6.0 + up * 2.0;
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        let arm = Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.1)).position(0.5, 0.0, 0.0);
+        let arm = world.insert(arm.velocity(spin.cross(Vec3::X * 0.5), spin));
+        let joint = Joint::to_world(arm, Vec3::X * -0.5, Vec3::ZERO);
+        world.insert_joint(joint.generic([Axis::LOCKED; 3], angular));
+        let mut simulation = simulate(world, open);
+        let begin = simulation.world.kinetic_energy();
+        let (mut highest, mut turned, mut before, mut most) = (0.0_f32, 0.0_f32, Vec3::X, 0.0_f64);
+        steps(&mut simulation, 4.0, |_, world| {
+            let now = world.bodies[0].rotation * Vec3::X;
+            highest = highest.max(now.dot(around).abs().asin());
+            turned += now.angle_between(before);
+            (before, most) = (now, most.max(world.kinetic_energy() / begin));
+        });
+        assert!((limit - 0.01..limit + 0.01).contains(&highest), "{limited}: {highest}");
+        assert!(turned > 2.0 * TAU && most < 1.002, "{limited}: {turned} rad, {most} of the energy");
     }
 }
 
