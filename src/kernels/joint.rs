@@ -113,6 +113,25 @@ pub fn solve_joint<L: Lane>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernels::rows::Body;
+    use crate::math::Quat;
+
+    /// The centers of the bodies are apart by the difference of the arms if both arms end at one place.
+    #[test]
+    fn both_arms_of_an_open_joint_end_at_one_place() {
+        let joint = Joint {
+            r_a: vec3(0.3_f64, 0.1, -0.2),
+            r_b: vec3(-0.4, 0.2, 0.1),
+            gap: vec3(0.02, -0.05, 0.03),
+            ..Joint::default()
+        };
+        let a = Body { dp: vec3(0.1, 0.2, 0.3), dq: Quat { axis: vec3(0.0, 0.0, 0.6), w: 0.8 }, ..Body::default() };
+        let b = Body { dp: vec3(-0.1, 0.1, 0.0), dq: Quat { axis: vec3(0.28, 0.0, 0.0), w: 0.96 }, ..Body::default() };
+        let ([r_a, r_b], _) = current_anchors(&Pair { a, b, ..Pair::default() }, &joint);
+        let apart = (joint.gap + joint.r_a - joint.r_b) + (b.dp - a.dp);
+        let off = (r_a - r_b) - apart;
+        assert!(dot3(off, off) < 1e-30, "{off:?}");
+    }
 
     /// Nothing moves along z. 2^-19 is added to the half of the block, whose trace of 2 is scaled to 1.
     #[test]
