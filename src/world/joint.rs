@@ -1,6 +1,6 @@
 //! Joints: they restrict the relative motion of two bodies.
 
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Quat, Vec3};
 
@@ -379,7 +379,9 @@ impl Joint {
         let (twist, swings) = (self.twist_axis(), self.swings());
         let needs_lock = |angle: usize| swings && self.angular[angle].bounds == Bounds::Locked;
         let are_others_free = || (0..3).all(|other| other == angle || self.angular[other].bounds == Bounds::Free);
-        let is_limited = matches!(self.angular[angle].bounds, Bounds::Between { .. });
+        // A height has no angle above a quarter of a turn.
+        let is_limited =
+            matches!(self.angular[angle].bounds, Bounds::Between { min, max } if min < FRAC_PI_2 && max > -FRAC_PI_2);
         match (angle + 3 - twist) % 3 {
             0 if !needs_lock(angle) => angles::TWIST,
             place if is_limited && are_others_free() => angles::ELEVATION + place - 1,

@@ -9,9 +9,9 @@ use super::joint::{Joint, Linear, NO_FRAME, NOWHERE};
 use super::joint_axis::{Axis, Bounds, Drive};
 use super::limits::{MAX_LENGTH, MAX_SPEED, check_rotation};
 use crate::error::{Result, ensure};
-use crate::math::Quat as Rotation;
 use crate::math::angles::{self, Angles};
 use crate::math::rotation::{product, unit};
+use crate::math::{Quat as Rotation, vec3};
 
 /// Position and speed of body a against body b along each axis of a joint: three translations, then three rotations.
 ///
@@ -99,7 +99,7 @@ impl World {
         let angles = [0, 1, 2].map(|angle| match joint.coordinate(angle) {
             elevation @ angles::ELEVATION.. => {
                 let place = elevation - angles::ELEVATION;
-                let axis = Rotation::load([Vec3::Y, Vec3::Z][place].extend(0.0).to_array()).axis;
+                let axis = [vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)][place];
                 angles::elevation(values[angles::HEIGHT + place], directions[angles::HEIGHT + place], axis)
             }
             number => (values[number], directions[number]),

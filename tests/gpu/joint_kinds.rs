@@ -37,6 +37,7 @@ tests! {
         a_hinge_swings_with_the_period_of_a_physical_pendulum,
         a_free_angle_turns_on_while_the_others_keep_their_limits,
         an_arm_keeps_the_limit_of_its_height_all_around,
+        limits_above_a_quarter_turn_are_those_of_a_swing,
         a_joint_with_two_free_angles_keeps_the_third_through_half_a_turn,
         a_limit_stands_where_it_is_however_far_the_other_one_is,
         a_motor_is_no_stronger_than_its_largest_torque,
@@ -225,6 +226,21 @@ fn an_arm_keeps_the_limit_of_its_height_all_around(open: Open) {
         assert!((limit - 0.01..limit + 0.01).contains(&highest), "{limited}: {highest}");
         assert!(turned > 2.0 * TAU && most < 1.002, "{limited}: {turned} rad, {most} of the energy");
     }
+}
+
+/// A height has no such angle, and the joint would push for ever.
+fn limits_above_a_quarter_turn_are_those_of_a_swing(open: Open) {
+    let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    let cube = Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).rotation(Quat::from_rotation_z(2.2));
+    let cube = world.insert(cube.velocity(Vec3::ZERO, Vec3::Z));
+    let joint = Joint::to_world(cube, Vec3::ZERO, Vec3::ZERO);
+    world.insert_joint(joint.generic([Axis::LOCKED; 3], [Axis::FREE, Axis::FREE, Axis::limited(2.0, 2.5)]));
+    let mut simulation = simulate(world, open);
+    steps(&mut simulation, 2.0, |_, _| {});
+    let world = &simulation.world;
+    let turned = world.joint_motion(&world.joints[0]).position[5];
+    let spin = world.bodies[0].angular_velocity.length();
+    assert!((2.0..2.501).contains(&turned) && spin < 1.001, "{turned} rad, {spin} rad/s");
 }
 
 fn a_limited_hinge_stops_at_its_limits(open: Open) {
