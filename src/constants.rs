@@ -67,8 +67,9 @@ pub const STIFFEST: f32 = 0.5;
 /// mass at the end, which go slack and snap, over 50 s. With 3 no chain gains energy and gaps stay below 25 mm. With 2
 /// and less, energy grows by up to 0.1 of the swing, as the added inertia comes and goes. With 4 gaps reach 2.5 m.
 pub const SWING_LIMIT: f64 = 3.0;
-/// The factor by which a joint of a swinging net may open further in the next step.
-pub const GROWTH: f32 = 2.5;
+/// Shorter substeps have to reduce the gap of a joint to this fraction. If not, a load that cannot be met holds it open,
+/// and the step is not taken again until the gap has grown by the inverse. Gaps that motion opens fall to a quarter.
+pub const HELPS: f32 = 0.5;
 /// The largest turn of a body against another in a step for which the angles of their joint keep the directions that
 /// they have when the step begins (rad). The angles are then off by half of its square.
 pub const SLOW_TURN: f32 = 0.02;
@@ -106,11 +107,9 @@ pub const LAST_BITS: f64 = 4.0 * f32::EPSILON as f64;
 /// Largest number of substeps in a step for which rounding of velocities adds up. Shorter substeps sum changes, which
 /// round less.
 pub const MAX_ROUNDINGS: f64 = 16.0;
-/// Share of its energy that an island with joints can gain in a step before it takes shorter substeps.
+/// Share of its energy by which the rotation of an island that nothing holds can exceed the energy that is left to it,
+/// because its positions are wrong. Above this share its step is refused.
 pub const COARSE: f64 = 0.1;
-/// Shorter substeps have to reduce that share to this fraction before an island takes them again. If joints and
-/// contacts push against each other, shorter substeps make the gain larger.
-pub const HELPS: f32 = 0.5;
 
 // Sleep and events: src/sleep.rs, src/simulation/events.rs.
 

@@ -49,8 +49,10 @@ pub struct Interface {
 pub struct JointNeed {
     /// The largest force of its drives (N).
     pub drives: f32,
-    /// The need from the rotation of its arms.
-    pub turns: f32,
+    /// The gap that the last step left in class 0, over the promised gap.
+    pub opening: f32,
+    /// Whether shorter substeps did not reduce the gap.
+    pub is_stuck: bool,
 }
 
 /// The class of effort of each island.
@@ -58,6 +60,8 @@ pub struct JointNeed {
 pub struct Effort {
     /// The class of each body.
     classes: Vec<u8>,
+    /// The class of each body when the step first ran.
+    first_classes: Vec<u8>,
     /// Steps in a row in which the next lower class would have been enough, for each body.
     descent_steps: Vec<u8>,
     /// Bodies that began on other bodies without a balance of forces, and whose islands have not come to rest since.
@@ -96,7 +100,7 @@ crate::saved::cloned!(Effort {
     long_from,
     movable,
     counts,
-} scratch { awake, islands, of_root });
+} scratch { first_classes, awake, islands, of_root });
 
 impl Saved for Effort {
     fn blank() -> Self {
@@ -116,6 +120,7 @@ impl Saved for Effort {
             long_from,
             movable,
             counts,
+            first_classes: _,
             awake: _,
             islands: _,
             of_root: _,
@@ -193,7 +198,7 @@ impl Effort {
         }
         let any_unbalanced = !self.unbalanced.is_empty();
         let changed = (is_first || self.any_above || is_above || any_unbalanced)
-            && self.follow_islands(world, asleep, interfaces(), dt);
+            && self.follow_islands(world, asleep, interfaces(), dt, Island::next);
         if any_unbalanced {
             let (islands, of_root) = (&mut self.islands, &self.of_root);
             self.unbalanced.retain(|&body| {
@@ -202,6 +207,23 @@ impl Effort {
             });
         }
         changed
+    }
+
+    /// Raises the classes of islands with joints that opened too far in the step. An island returns to the class with
+    /// which the step first ran if that did not help. Returns whether any class changed: the step is then taken again.
+    /// `is_first`: the step ran once so far.
+    pub fn correct(
+        &mut self,
+        world: &World,
+        asleep: &[bool],
+        dt: f32,
+        is_first: bool,
+        interfaces: impl Iterator<Item = Interface> + Clone,
+    ) -> bool {
+        if is_first {
+            self.first_classes.clone_from(&self.classes);
+        }
+        self.follow_islands(world, asleep, interfaces, dt, |island, highest, _| island.corrected(highest))
     }
 
     /// Follows bodies that were added, removed, or changed in kind, groups or shapes.
@@ -222,6 +244,9 @@ impl Effort {
     /// Adds bodies that begin on other bodies without a balance of forces.
     pub fn note_unbalanced(&mut self, bodies: Vec<u32>) {
         self.unbalanced.extend(bodies);
+        // A step that is taken again adds the same bodies.
+        self.unbalanced.sort_unstable();
+        self.unbalanced.dedup();
     }
 
     /// Raises the class of the bodies of an island by two, which quarters the substep of the next step. Returns whether
@@ -254,7 +279,7 @@ impl Effort {
             Interface { a, b, need: need as f32, force: 0.0, joint: None }
         };
         let interfaces: Vec<_> = Load::all(world, config, touches).iter().map(interface).collect();
-        self.follow_islands(world, &[], interfaces.iter().copied(), dt);
+        self.follow_islands(world, &[], interfaces.iter().copied(), dt, Island::next);
     }
 
     fn follow_islands(
@@ -263,6 +288,7 @@ impl Effort {
         asleep: &[bool],
         interfaces: impl Iterator<Item = Interface> + Clone,
         dt: f32,
+        next: impl Fn(&Island, u8, u8) -> (u8, u8),
     ) -> bool {
         let bodies = world.bodies.len();
         self.islands.reset(bodies);
@@ -286,6 +312,7 @@ impl Effort {
             let i = i as usize;
             island.bodies += 1;
             island.class = island.class.max(self.classes[i]);
+            island.first_class = island.first_class.max(self.first_classes.get(i).copied().unwrap_or(0));
             island.descent_steps = island.descent_steps.min(self.descent_steps[i]);
             island.fastest = island.fastest.max(body.linear_velocity.length());
             if is_dynamic {
@@ -294,10 +321,12 @@ impl Effort {
         }
         let body_of = |a: u32, b: u32| Some(if a == IMMOVABLE { b } else { a }).filter(|&body| body != IMMOVABLE);
         for Interface { a, b, joint, .. } in interfaces.clone() {
-            if let Some((body, JointNeed { drives, turns })) = body_of(a, b).zip(joint) {
+            if let Some((body, JointNeed { drives, opening, is_stuck })) = body_of(a, b).zip(joint) {
                 let island = &mut self.of_root[root(body)];
                 island.load += drives;
-                island.whole_need = island.whole_need.max(turns);
+                island.opening = island.opening.max(opening);
+                island.whole_need = island.whole_need.max(opening);
+                island.is_stuck |= is_stuck;
             }
         }
         for Interface { a, b, need, force, joint } in interfaces {
@@ -316,7 +345,7 @@ impl Effort {
             *need = need.max(self.unbalanced_need);
         }
         for island in self.of_root.iter_mut().filter(|island| island.bodies > 0) {
-            (island.class, island.descent_steps) = island.next(self.highest, self.long_from);
+            (island.class, island.descent_steps) = next(island, self.highest, self.long_from);
         }
         let mut changed = std::mem::take(&mut self.is_refined);
         self.counts = [0; EFFORT_CLASSES];

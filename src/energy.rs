@@ -14,7 +14,7 @@ use glam::{DMat3, DVec3, Quat, Vec3};
 use rayon::prelude::*;
 
 use crate::config::SolverConfig;
-use crate::constants::{COARSE, HELPS, LAST_BITS, MAX_ROUNDINGS, REGAINED, ROUNDING};
+use crate::constants::{COARSE, LAST_BITS, MAX_ROUNDINGS, REGAINED, ROUNDING};
 use crate::effort::Effort;
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
@@ -66,11 +66,9 @@ struct Kept {
     reserve: f32,
     /// The energy in the springs of its joints, and of the contacts of jointed bodies.
     springs: f32,
-    /// The gain, as a share of the island's energy, when the island last took shorter substeps because of it; 0 before.
-    made: f32,
 }
 
-crate::saved::fields!(Kept { reserve, springs, made });
+crate::saved::fields!(Kept { reserve, springs });
 
 /// The energies of a body, or of an island, in a step (J).
 #[derive(Clone, Copy, Debug, Default)]
@@ -203,10 +201,8 @@ impl Saved for Energy {
         self.kept.resize(bodies, Kept::default());
         archive.runs(bodies, |i, archive| {
             self.kept[i].walk(archive)?;
-            let Kept { reserve, springs, made } = self.kept[i];
-            ensure(reserve >= 0.0 && springs >= 0.0 && made >= 0.0, || {
-                format!("body {i} keeps {reserve} J and {springs} J, after {made}")
-            })
+            let Kept { reserve, springs } = self.kept[i];
+            ensure(reserve >= 0.0 && springs >= 0.0, || format!("body {i} keeps {reserve} J and {springs} J"))
         })
     }
 }
@@ -272,7 +268,7 @@ impl Energy {
         let is_fine = |entry: &Entry| entry.left() + entry.rounding >= entry.springs;
         if self.entries.iter().all(is_fine) {
             let all = self.kept.iter_mut().zip(&self.entries);
-            all.for_each(|(kept, entry)| *kept = Kept { made: kept.made, ..Kept::of(entry, entry.left()) });
+            all.for_each(|(kept, entry)| *kept = Kept::of(entry, entry.left()));
             return Taken::default();
         }
         self.join(world, problem);
@@ -285,7 +281,7 @@ impl Energy {
         let share = |of: f32, sum: f64| if sum > 0.0 { f64::from(of) / sum } else { 0.0 };
         for account in &mut self.accounts {
             let Account { all, slack, released, .. } = account;
-            let Kept { springs, reserve, .. } = Kept::of(all, all.left() + *released);
+            let Kept { springs, reserve } = Kept::of(all, all.left() + *released);
             account.shares = [share(springs, all.springs), share(reserve, *slack)];
         }
         for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
@@ -435,14 +431,7 @@ impl Energy {
             let is_whole = over.is_finite()
                 && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into())
                 && brake(world, problem, members.clone(), [over, all.after], from_start.as_ref());
-            if is_whole {
-                let share = (over / all.after) as f32;
-                let before = members.clone().map(|i| self.kept[i].made).fold(0.0, f32::max);
-                let helped = before == 0.0 || share < HELPS * before;
-                if all.lever > 0.0 && over > COARSE * all.after && helped && effort.refine(members.clone()) {
-                    members.for_each(|i| self.kept[i].made = share);
-                }
-            } else {
+            if !is_whole {
                 taken.refused += 1;
                 *is_refused = true;
                 let is_finer = effort.refine(members.clone());
@@ -482,7 +471,7 @@ impl Kept {
     /// The kept energies if the motion lost `left`.
     fn of(entry: &Entry, left: f64) -> Self {
         let springs = left.min(entry.springs).max(0.0);
-        Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32, made: 0.0 }
+        Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32 }
     }
 }
 

@@ -61,6 +61,7 @@ mod math;
 mod memory;
 pub mod metrics;
 mod names;
+mod openings;
 mod panics;
 mod plan;
 pub mod preset;

@@ -361,11 +361,24 @@ impl Simulation {
         loop {
             let (step, carry) = assembled(&mut self.stages);
             let ran = timed(&mut stats.times.run, || self.backend.step(step, carry));
-            let Err(error) = ran else { break };
-            let successor = if error.is_lost() { self.backend.successor() } else { None };
-            self.repeat_step(error, successor, dt, stats)?;
+            if let Err(error) = ran {
+                let successor = if error.is_lost() { self.backend.successor() } else { None };
+                self.repeat_step(error, successor, dt, stats)?;
+            } else if !self.stages.prepare_again(&self.world, &self.config, dt, stats) {
+                break;
+            }
         }
         self.store_step(dt, stats, true);
+        Ok(())
+    }
+
+    /// Stores the results of the assembled step that ran on another backend. A step that has to be taken again runs on
+    /// the backend of this simulation.
+    pub(crate) fn end_joined_step(&mut self, dt: f32, stats: &mut StepStats) -> Result<()> {
+        if self.stages.prepare_again(&self.world, &self.config, dt, stats) {
+            return self.end_step(dt, stats);
+        }
+        self.store_step(dt, stats, false);
         Ok(())
     }
 
@@ -376,16 +389,19 @@ impl Simulation {
             let start = Stopwatch::start();
             let ran = self.backend.step_async(step, carry).await;
             stats.times.run += start.elapsed();
-            let Err(error) = ran else { break };
-            let successor = if error.is_lost() { self.backend.successor_async().await } else { None };
-            self.repeat_step(error, successor, dt, stats)?;
+            if let Err(error) = ran {
+                let successor = if error.is_lost() { self.backend.successor_async().await } else { None };
+                self.repeat_step(error, successor, dt, stats)?;
+            } else if !self.stages.prepare_again(&self.world, &self.config, dt, stats) {
+                break;
+            }
         }
         self.store_step(dt, stats, true);
         Ok(())
     }
 
     /// Stores the results of the step that ran, on the backend of this simulation or on another one.
-    pub(crate) fn store_step(&mut self, dt: f32, stats: &mut StepStats, on_own_backend: bool) {
+    fn store_step(&mut self, dt: f32, stats: &mut StepStats, on_own_backend: bool) {
         let stages = &mut self.stages;
         self.on_device = on_own_backend && self.backend.keeps_rows();
         if on_own_backend {

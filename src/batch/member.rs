@@ -163,8 +163,7 @@ impl Member {
         let length = dt.unwrap_or(self.dt);
         guarded(|| {
             if ran {
-                simulation.store_step(length, stats, false);
-                return Ok(());
+                return simulation.end_joined_step(length, stats);
             }
             simulation.end_step(length, stats)
         })?;

@@ -93,8 +93,9 @@ pub struct SolverConfig {
     pub friction_at: FrictionAt,
     /// Which sweeps solve friction.
     pub friction_sweeps: FrictionSweeps,
-    /// Largest gap of a joint, relative to its arms. If sweeps would leave a larger gap in a net, the net takes more
-    /// substeps. Joints whose arms rotate fast also take more substeps.
+    /// Largest gap of a joint, relative to its arms, and largest angle that it may be off (rad). A step that opens a joint
+    /// further is taken again with more substeps. If sweeps would leave a larger gap in a net, the net takes more
+    /// substeps.
     pub max_joint_gap_share: f32,
     /// How joints are solved. `auto` solves all joints of a connected set of bodies at once if that takes time in
     /// proportion to their number, as in chains, trees and single loops. It sweeps nets. Motors and springs are always

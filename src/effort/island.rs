@@ -19,6 +19,12 @@ pub struct Island {
     /// The highest class of its bodies, and the fewest steps of any towards a lower class.
     pub class: u8,
     pub descent_steps: u8,
+    /// Likewise the class with which the step first ran.
+    pub first_class: u8,
+    /// The largest gap that the step left in a joint in class 0, over the promised gap.
+    pub opening: f32,
+    /// Whether shorter substeps did not reduce the gap of a joint.
+    pub is_stuck: bool,
 }
 
 impl Island {
@@ -32,6 +38,9 @@ impl Island {
         fastest: 0.0,
         class: 0,
         descent_steps: u8::MAX,
+        first_class: 0,
+        opening: 0.0,
+        is_stuck: false,
     };
 
     /// The need of the contacts that counts. A column passes its load on through one contact for each body, and sways
@@ -40,6 +49,13 @@ impl Island {
     fn counted(&self) -> f32 {
         let ways = (self.bodies as f32 / self.contacts.max(1) as f32).min(1.0);
         self.largest_need * ways * ways
+    }
+
+    /// The class with which the step is taken again, and the number of steps so far towards a lower one.
+    pub fn corrected(&self, highest: u8) -> (u8, u8) {
+        let wanted = class_for(self.opening).min(highest);
+        let least = if self.is_stuck { self.first_class } else { self.class };
+        if wanted > self.class { (wanted, 0) } else { (wanted.max(least), self.descent_steps) }
     }
 
     /// The next class, and the number of steps so far towards a lower one. `highest` is the highest class that the

@@ -6,10 +6,11 @@ use super::{Entry, can_move, ends, moved_by};
 use crate::config::SolverConfig;
 use crate::constants::LAST_BITS;
 use crate::kernels::Rules;
-use crate::kernels::axis::{AxisMotion, Frames, axis_inverse_mass, axis_motion, axis_speed};
+use crate::kernels::axis::{axis_inverse_mass, axis_speed};
 use crate::kernels::pair::relative_movement;
-use crate::kernels::rows::{Axis, Body as BodyOf, Joint, Mass, Pair};
+use crate::kernels::rows::{Axis, Body as BodyOf, Joint, Pair};
 use crate::math::dot3;
+use crate::openings::{gap_after, motion_of, pair_of};
 use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count, stiffness};
 use crate::world::{Body, BodyKind, World};
 
@@ -38,9 +39,7 @@ pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &
         }
         for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
             let axis = Axis::<f64>::load(&problem.axes[k]);
-            let moved = motion_of(&pair, &of_joint, &axis).moved;
-            let (place, left) = (axis.gap + moved, axis.left - moved);
-            let gap = if problem.axes[k].is_limit() { place.min(left).min(0.0) } else { place };
+            let gap = gap_after(&problem.axes[k], motion_of(&pair, &of_joint, &axis).moved);
             energy += (axis_impulse(problem, k, &problem.joint_impulses) * gap).abs();
         }
         entries[body as usize].springs += 0.5 * energy / substep(body as usize);
@@ -72,7 +71,7 @@ pub(super) fn add_springs_at_start(
             if joint.is_loose == 0.0 { 0.5 * mass * frequency.powi(2) * dot3(of_joint.gap, of_joint.gap) } else { 0.0 };
         for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
             let axis = Axis::<f64>::load(&problem.axes[k]);
-            let gap = if problem.axes[k].is_limit() { axis.gap.min(axis.left).min(0.0) } else { axis.gap };
+            let gap = gap_after(&problem.axes[k], 0.0);
             let motion = motion_of(&pair, &of_joint, &axis);
             energy += 0.5 * (frequency * gap).powi(2) / axis_inverse_mass(&pair, &motion);
         }
@@ -156,17 +155,6 @@ fn axes_of(joint: &JointRow) -> std::ops::Range<usize> {
 
 fn axis_impulse(problem: &StepProblem, axis: usize, impulses: &[JointImpulseRow]) -> f64 {
     f64::from(impulses[problem.joints.len() + axis].linear[0])
-}
-
-fn motion_of(pair: &Pair<f64>, joint: &Joint<f64>, axis: &Axis<f64>) -> AxisMotion<f64> {
-    axis_motion(pair, &Frames::of(pair, joint), axis)
-}
-
-/// The bodies of a joint at the end of the step.
-fn pair_of(problem: &StepProblem, joint: &JointRow) -> Pair<f64> {
-    let [a, b] = ends(joint).map(|end| BodyOf::load(&problem.bodies[end as usize]));
-    let [mass_a, mass_b] = ends(joint).map(|end| Mass::load(&problem.masses[end as usize]));
-    Pair { a, b, mass_a, mass_b, ..Pair::default() }
 }
 
 /// The bodies of a joint at the start of the step.

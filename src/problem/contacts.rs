@@ -47,6 +47,8 @@ pub struct ContactRows {
     materials: Option<Materials>,
     /// The bodies that lie still and have only new contacts.
     new_bodies: Vec<bool>,
+    /// The rows before the step.
+    before: Before,
     /// The material that hooks gave to the contact of each slot; empty if they gave none.
     hooked: Vec<Option<Material>>,
     /// Whether impulses are summed over the substeps of a step.
@@ -66,7 +68,17 @@ crate::saved::cloned!(ContactRows {
     hooked,
     sums,
     carry,
-} scratch { graph, poses, impacts, new_bodies });
+} scratch { graph, poses, impacts, new_bodies, before });
+
+/// What a step changes before it runs, for a step that is taken again.
+#[derive(Debug, Default)]
+struct Before {
+    contacts: Vec<ContactRow>,
+    impulses: Vec<ImpulseRow>,
+    writes: Vec<Write>,
+    classes: Vec<u8>,
+    layout: Layout,
+}
 
 /// The rows that contacts have besides those of their points, and whether rows have slips.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -380,6 +392,27 @@ impl ContactRows {
     /// The bodies that [`Self::note_new_bodies`] marked; empty if there are none.
     pub fn new_bodies(&self) -> &[bool] {
         &self.new_bodies
+    }
+
+    /// Keeps the rows of contacts before a step, so that the step can be taken again.
+    pub fn keep(&mut self, problem: &StepProblem) {
+        let Self { before, slots, classes, layout, .. } = self;
+        before.contacts.clone_from(&problem.contacts);
+        before.impulses.clone_from(&problem.impulses);
+        before.writes.clear();
+        before.writes.extend(slots.all.iter().map(|slot| slot.write));
+        before.classes.clone_from(classes);
+        before.layout = *layout;
+    }
+
+    /// Returns to the rows of [`Self::keep`].
+    pub fn go_back(&mut self, problem: &mut StepProblem) {
+        let Self { before, slots, classes, layout, .. } = self;
+        problem.contacts.clone_from(&before.contacts);
+        problem.impulses.clone_from(&before.impulses);
+        slots.all.iter_mut().zip(&before.writes).for_each(|(slot, write)| slot.write = *write);
+        classes.clone_from(&before.classes);
+        *layout = before.layout;
     }
 
     /// Writes the rows of a step of `dt` seconds, after the rows of bodies.

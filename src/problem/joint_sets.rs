@@ -57,12 +57,11 @@ fn movable<'a>(joint: &Joint, world: &'a World) -> impl Iterator<Item = &'a Body
     bodies(joint).map(|i| &world.bodies[i]).filter(|body| body.kind == BodyKind::Dynamic)
 }
 
-/// The gap of a swept joint that the settings promise (m), and the force that opens it this far (N); `None` if no force
-/// does. `substep` is the length of a substep (s).
-pub fn promised_gap(joint: &Joint, world: &World, config: &SolverConfig, substep: f32) -> Option<[f32; 2]> {
+/// The force that opens a swept joint by the gap that the settings promise (N); `None` if no force does. `substep` is
+/// the length of a substep (s).
+pub fn force_of_promised_gap(joint: &Joint, world: &World, config: &SolverConfig, substep: f32) -> Option<f32> {
     let omega = TAU * config.joint_frequency / substep;
-    let share = share_of_force(joint, world, omega)?;
-    Some([config.max_joint_gap_share * arms(joint, world), config.max_joint_gap_share / share])
+    Some(config.max_joint_gap_share / share_of_force(joint, world, omega)?)
 }
 
 /// The gap that sweeps leave in a joint, as a share of its arms, or the angle that they leave under the moment of the

@@ -7,15 +7,15 @@ use glam::Vec3;
 
 use super::axes;
 use super::geometric_stiffness::{StiffnessInertia, add_stiffness_inertia};
-use super::joint_sets::{gap_of_sweeps, promised_gap};
+use super::joint_sets::{force_of_promised_gap, gap_of_sweeps};
 use super::rows::{BodyRow, JointImpulseRow, JointRow, MassRow, Substep, TorqueRow};
 use super::{JointSystems, StepProblem};
 use crate::config::{JointSolver, SolverConfig};
-use crate::constants::{GROWTH, MAX_TERMS_A_NODE, SLOW_TURN};
+use crate::constants::{DESCENT_SHARE, HELPS, MAX_TERMS_A_NODE, SLOW_TURN};
 use crate::effort::{self, Effort, Interface, JointNeed};
 use crate::error::{Result, ensure};
 use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE, Islands};
-use crate::world::{Body, BodyKind, Bounds, Joint, JointHandle, Linear, World};
+use crate::world::{BodyKind, Joint, JointHandle, World};
 
 /// The joints that have rows, and their colors.
 #[derive(Debug, Default)]
@@ -43,10 +43,10 @@ pub struct JointRows {
     swept_gap: f32,
     /// The needs of the joints that are left to sweeps.
     left: Vec<LeftToSweeps>,
-    /// The factor from ω² of turning arms to the gap that they open, relative to the promised gap (s²).
-    gap_of_turns: f32,
-    /// The length of a step (s).
-    step: f32,
+    /// The gap of each joint after the last step.
+    openings: Vec<Opening>,
+    /// The rows before the step.
+    before: Before,
     /// Stiffness inertia of bodies, in memory that steps reuse.
     stiffness_inertias: Vec<StiffnessInertia>,
 }
@@ -64,22 +64,45 @@ crate::saved::state!(JointRows {
     gravity,
     swept_gap,
     left,
-} scratch { graph, sums, gap_of_turns, step, stiffness_inertias });
+    openings,
+} scratch { graph, sums, before, stiffness_inertias });
 
 /// The need of a joint that is left to sweeps; 0 for other joints.
 #[derive(Clone, Copy, Debug)]
 struct LeftToSweeps {
     /// The gap with the substeps of the settings, over the promised gap.
     need: f32,
-    /// The promised gap (m), and the force that opens it this far with these substeps (N).
-    gap: f32,
+    /// The force that opens the promised gap with these substeps (N).
     force: f32,
 }
 
-crate::saved::fields!(LeftToSweeps { need, gap, force });
+crate::saved::fields!(LeftToSweeps { need, force });
 
 impl LeftToSweeps {
-    const NONE: Self = Self { need: 0.0, gap: f32::INFINITY, force: f32::INFINITY };
+    const NONE: Self = Self { need: 0.0, force: f32::INFINITY };
+}
+
+/// The gap of a joint after a step, relative to the promised gap.
+#[derive(Clone, Copy, Debug, Default)]
+struct Opening {
+    /// The gap with the substeps of the settings.
+    need: f32,
+    /// For a swept joint the gap after the next step with these substeps, if the joint goes on to open as fast; else 0.
+    next: f32,
+    /// The gap that shorter substeps did not reduce; 0 if there is none.
+    stuck: f32,
+}
+
+crate::saved::fields!(Opening { need, next, stuck });
+
+/// What a step changes before it runs, for a step that is taken again.
+#[derive(Debug, Default)]
+struct Before {
+    impulses: Vec<JointImpulseRow>,
+    shares: Vec<f32>,
+    twists: Vec<Option<f32>>,
+    /// The gaps that the last try of the step left, over the promised gaps; empty before the first try.
+    tried: Vec<f32>,
 }
 
 /// Stands for the system of a joint that is swept.
@@ -107,10 +130,10 @@ impl JointRows {
     /// Refuses rows with indices beyond the bodies, joints or systems.
     pub(crate) fn check(&self, bodies: usize, problem: &StepProblem) -> Result<()> {
         let count = self.joints.len();
-        let lengths = [self.handles.len(), self.edges.len(), self.shares.len(), self.twists.len()];
+        let lengths = [self.handles.len(), self.edges.len(), self.shares.len(), self.twists.len(), self.openings.len()];
         // The impulses of axes come after those of joints.
         let impulses = problem.joint_impulses.len();
-        ensure(lengths == [count; 4] && impulses >= count, || {
+        ensure(lengths == [count; 5] && impulses >= count, || {
             format!("{lengths:?}, {impulses} rows of {count} joints")
         })?;
         let is_body = |&body: &u32| body == IMMOVABLE || (body as usize) < bodies;
@@ -145,8 +168,6 @@ impl JointRows {
     /// swept joint leaves a gap that it closes softly. A later direct solution would gain energy from this gap.
     /// `substep` is the length of a substep (s).
     pub fn choose(&mut self, world: &World, config: &SolverConfig, substep: f32, problem: &mut StepProblem) {
-        self.gap_of_turns = 0.5 * substep * substep / config.max_joint_gap_share;
-        self.step = substep * config.substeps as f32;
         let is_chosen = self.chosen_for.replace(substep) == Some(substep);
         let felt = || {
             let ends = self.joints.iter().map(Joint::indices);
@@ -182,19 +203,64 @@ impl JointRows {
         }
     }
 
-    /// Updates the needs of the joints that are left to sweeps, from their impulses in the last substep and their
-    /// present gaps. The gaps count because a swinging net opens further than its load tells. `substep` is the length
-    /// of a substep of class 0 (s).
-    pub fn follow_loads(&mut self, world: &World, substep: f32, problem: &StepProblem) {
-        let rows = self.left.iter_mut().zip(&self.joints).zip(&self.shares).zip(&problem.joint_impulses);
-        for (((left, joint), share), impulse) in
-            rows.filter(|(((left, _), share), _)| left.gap.is_finite() && **share > 0.0)
-        {
+    /// Updates the needs of the joints that are left to sweeps, from their impulses in the last substep. `substep` is
+    /// the length of a substep of class 0 (s).
+    pub fn follow_loads(&mut self, substep: f32, problem: &StepProblem) {
+        let rows = self.left.iter_mut().zip(&self.shares).zip(&problem.joint_impulses);
+        for ((left, share), impulse) in rows.filter(|((left, share), _)| left.force.is_finite() && **share > 0.0) {
             let borne = Vec3::from(impulse.linear).length() / (share * substep);
-            let [a, b] = world.anchors(joint);
-            // Gaps fall with the square of the substep.
-            let need = (borne / left.force).max(GROWTH * a.distance(b) / (left.gap * share * share));
-            left.need = effort::lasting(need, left.need);
+            left.need = effort::lasting(borne / left.force, left.need);
+        }
+    }
+
+    /// Keeps the rows of joints before a step, so that the step can be taken again.
+    pub fn keep(&mut self, problem: &StepProblem) {
+        let Self { before, shares, twists, .. } = self;
+        before.impulses.clone_from(&problem.joint_impulses);
+        before.shares.clone_from(shares);
+        before.twists.clone_from(twists);
+        before.tried.clear();
+    }
+
+    /// Returns to the rows of [`Self::keep`].
+    pub fn go_back(&mut self, problem: &mut StepProblem) {
+        let Self { before, shares, twists, .. } = self;
+        problem.joint_impulses.clone_from(&before.impulses);
+        shares.clone_from(&before.shares);
+        twists.clone_from(&before.twists);
+    }
+
+    /// Measures how far the joints are open after the step that `problem` ran.
+    ///
+    /// Gaps that motion opens fall with the square of the substep. A gap was there before if it does not grow, and a
+    /// load that cannot be met holds it open if shorter substeps leave it. Neither needs shorter substeps.
+    pub fn measure(
+        &mut self,
+        config: &SolverConfig,
+        problem: &StepProblem,
+        openings: impl Fn(&StepProblem, usize) -> [f64; 2],
+    ) {
+        let Self { openings: all, before: Before { tried, .. }, shares, systems, .. } = self;
+        let is_first = tried.is_empty();
+        tried.resize(all.len(), 0.0);
+        all.iter_mut().for_each(|opening| (opening.need, opening.next) = (0.0, 0.0));
+        for &row in problem.rows_of(&problem.joint_colors()) {
+            let row = row as usize;
+            let (opening, share) = (&mut all[row], shares[row]);
+            let [before, after] =
+                openings(problem, row).map(|gap| (gap / f64::from(config.max_joint_gap_share)) as f32);
+            let was = std::mem::replace(&mut tried[row], after);
+            // Nets swing, so they keep the share of the promise that a lower class has to keep.
+            let next = if systems[row] == SWEPT { after.max(2.0 * after - before) / DESCENT_SHARE } else { 0.0 };
+            opening.next = next / (share * share);
+            if after <= 1.0 {
+                opening.stuck = 0.0;
+            } else if !is_first && after > HELPS * was {
+                opening.stuck = after;
+            }
+            if after <= 1.0 || after > before && HELPS * after > opening.stuck {
+                opening.need = after / (share * share);
+            }
         }
     }
 
@@ -219,9 +285,8 @@ impl JointRows {
         } else {
             for joint in joints.iter().map(|&joint| joint as usize) {
                 let need = gap / config.max_joint_gap_share;
-                let promised = promised_gap(&self.joints[joint], world, config, substep);
-                self.left[joint] =
-                    promised.map_or(LeftToSweeps::NONE, |[gap, force]| LeftToSweeps { need, gap, force });
+                let force = force_of_promised_gap(&self.joints[joint], world, config, substep);
+                self.left[joint] = force.map_or(LeftToSweeps::NONE, |force| LeftToSweeps { need, force });
             }
         }
     }
@@ -277,6 +342,7 @@ impl JointRows {
         }
         self.shares = from.iter().map(|from| from.map_or(0.0, |i| self.shares[i])).collect();
         self.twists = from.iter().map(|from| from.and_then(|i| self.twists[i])).collect();
+        self.openings = from.iter().map(|from| from.map_or(Opening::default(), |i| self.openings[i])).collect();
         let mut ended = vec![true; before.len()];
         from.iter().flatten().for_each(|&i| ended[i] = false);
         let changed = now.iter().zip(&from).filter(|(joint, from)| from.is_none_or(|i| before[i] != **joint));
@@ -295,59 +361,9 @@ impl JointRows {
     }
 
     /// Whether any joint needs more than class 0 gives.
-    pub fn are_above(&self, world: &World) -> bool {
+    pub fn are_above(&self) -> bool {
         self.left.iter().any(|left| left.need > 1.0)
-            || (0..self.joints.len()).any(|joint| self.need_of_turns(world, joint) > 1.0)
-    }
-
-    /// The gap that motion at constant velocities would open in a joint in class 0, over the promised gap. Arms and axes
-    /// turn, but centers of mass move straight on. In a substep h this opens a direct joint by h²/2 times the
-    /// acceleration of its coordinates: ω² of an arm, 2 ω u where body a slides at u along axes that turn at ω, and u²/d
-    /// where u is across a distance d.
-    fn need_of_turns(&self, world: &World, joint: usize) -> f32 {
-        // The springs of swept joints would change their stiffness as bodies turn.
-        if self.systems.get(joint).is_none_or(|&system| system == SWEPT) {
-            return 0.0;
-        }
-        let joint = &self.joints[joint];
-        let [a, b] = [Some(joint.body_a), joint.body_b].map(|body| body.and_then(|body| world.body(body)));
-        let arm = |body: Option<&Body>, anchor: Vec3| body.map_or(0.0, |body| anchor.distance(body.mass.center));
-        let spin = |body: Option<&Body>| body.map_or(Vec3::ZERO, |body| body.angular_velocity);
-        let (arm_a, mut arm_b) = (arm(a, joint.anchor_a), arm(b, joint.anchor_b));
-        // The length of a rod or rope, and the acceleration of the coordinates besides that of the arms.
-        let (mut length, mut moved) = (0.0, 0.0);
-        if !joint.holds_anchors() {
-            let [at_a, at_b] = world.anchors(joint);
-            let velocity = |body: Option<&Body>, at: Vec3| body.map_or(Vec3::ZERO, |body| body.velocity_at(at));
-            match &joint.linear {
-                Linear::Distance(distance) => {
-                    let apart = at_a - at_b;
-                    let along = apart.normalize_or_zero();
-                    length = apart.length();
-                    let u = velocity(a, at_a) - velocity(b, at_b);
-                    let next = length + self.step * along.dot(u);
-                    let is_reached = match distance.bounds {
-                        Bounds::Free => false,
-                        Bounds::Locked => true,
-                        Bounds::Between { min, max } => length.max(next) >= max || length.min(next) <= min && min > 0.0,
-                    };
-                    // A rope that the step does not tighten opens nothing.
-                    if !is_reached {
-                        return 0.0;
-                    }
-                    let across = (u - along * along.dot(u)).length_squared();
-                    moved = if length > 0.0 { across / length } else { 0.0 };
-                }
-                Linear::Axes(axes) if axes.iter().all(|axis| axis.bounds == Bounds::Free) => return 0.0,
-                Linear::Axes(_) => {
-                    arm_b = b.map_or(0.0, |b| at_a.distance(b.center_of_mass()));
-                    moved = 2.0 * spin(b).length() * (velocity(a, at_a) - velocity(b, at_a)).length();
-                }
-            }
-        }
-        let arms = arm_a + arm_b + length;
-        let opened = arm_a * spin(a).length_squared() + arm_b * spin(b).length_squared() + moved;
-        if arms > 0.0 { self.gap_of_turns * opened / arms } else { 0.0 }
+            || self.openings.iter().any(|opening| opening.need.max(opening.next) > 1.0)
     }
 
     /// The joints that take part, for the effort of their islands. A moving kinematic body counts as a member of the
@@ -361,9 +377,11 @@ impl JointRows {
         };
         awake.map(move |(i, joint)| {
             let (a, b) = joint.indices();
-            let LeftToSweeps { need, force, .. } = self.left.get(i).copied().unwrap_or(LeftToSweeps::NONE);
-            let need_of_joint =
-                JointNeed { drives: axes::driving_force(joint, world), turns: self.need_of_turns(world, i) };
+            let LeftToSweeps { need, force } = self.left.get(i).copied().unwrap_or(LeftToSweeps::NONE);
+            let Opening { need: opening, next, stuck } = self.openings[i];
+            let need = need.max(next);
+            let drives = axes::driving_force(joint, world);
+            let need_of_joint = JointNeed { drives, opening, is_stuck: stuck > 0.0 };
             Interface { a: end(a), b: b.map_or(IMMOVABLE, end), need, force, joint: Some(need_of_joint) }
         })
     }

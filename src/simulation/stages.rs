@@ -8,10 +8,11 @@ use super::by_body::ByBody;
 use super::events::{ColliderOf, Event, Events, Hit, Met};
 use super::hooks::ContactHooks;
 use crate::collide::{Activity, ColliderSide, DetectStats, Detector, PairFilter};
-use crate::config::{FrictionAt, FrictionRule, SolverConfig};
+use crate::config::{FrictionAt, FrictionRule, JointSolver, SolverConfig};
 use crate::effort::Effort;
 use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
+use crate::openings::openings;
 use crate::panics::blaming;
 use crate::plan::{PlanKey, StepPlan};
 use crate::problem::{
@@ -20,7 +21,7 @@ use crate::problem::{
 use crate::rest;
 use crate::saved::{Archive, Saved};
 use crate::sleep::Sleep;
-use crate::stats::{StepStats, timed};
+use crate::stats::{EFFORT_CLASSES, StepStats, timed};
 use crate::world::{Body, BodyKind, JointHandle, Surface, World};
 
 /// Everything that a step passes to the next one, except the data on a device.
@@ -332,7 +333,7 @@ impl Stages {
                 energy.follow_contacts();
             }
             joints.choose(world, config, dt / config.substeps as f32, problem);
-            joints.follow_loads(world, dt / config.substeps as f32, problem);
+            joints.follow_loads(dt / config.substeps as f32, problem);
             joints.color(world, config.max_colors);
             stats.hardest = contacts.follow_loads(world, config, effort.is_one_class(), problem);
             if are_sorted_anew {
@@ -342,7 +343,7 @@ impl Stages {
             let asleep = sleep.asleep();
             let of_contacts = || contacts.interfaces(world, detector, config, dt);
             let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));
-            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above(world);
+            let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
             effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
         });
         Ok(changes_class || modified.materials)
@@ -350,6 +351,42 @@ impl Stages {
 
     /// Prepares and plans the step. With `on_device`, the device continues from its own rows.
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
+        if !world.joints.is_empty() {
+            let Self { contacts, joints, problem, .. } = self;
+            timed(&mut stats.times.prepare, || {
+                contacts.keep(problem);
+                joints.keep(problem);
+            });
+        }
+        self.write(world, config, dt, on_device, stats);
+    }
+
+    /// Prepares the step that ran once more, with shorter substeps for the islands with joints that opened beyond the
+    /// promise. Returns false if there are none: the step is done.
+    pub fn prepare_again(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
+        let Self { detector, sleep, effort, contacts, joints, problem, .. } = self;
+        let is_fixed = config.joint_solver == JointSolver::Sweeps || stats.repeats >= EFFORT_CLASSES as u32;
+        if is_fixed || problem.rows_of(&problem.joint_colors()).is_empty() {
+            return false;
+        }
+        let changes = timed(&mut stats.times.color, || {
+            joints.measure(config, problem, openings);
+            let asleep = sleep.asleep();
+            let of_contacts = contacts.interfaces(world, detector, config, dt);
+            let interfaces = of_contacts.chain(joints.interfaces(world, asleep));
+            effort.correct(world, asleep, dt, stats.repeats == 0, interfaces)
+        });
+        if changes {
+            contacts.go_back(problem);
+            joints.go_back(problem);
+            stats.repeats += 1;
+            self.write(world, config, dt, false, stats);
+        }
+        changes
+    }
+
+    /// Writes the rows of the step, and plans it.
+    fn write(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
         let Self { detector, sleep, effort, contacts, joints, problem, found, events, .. } = self;
         timed(&mut stats.times.prepare, || {
             problem::begin(world, sleep.asleep(), config, problem);

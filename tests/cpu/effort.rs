@@ -59,19 +59,107 @@ fn substeps_of_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> u32 {
     };
     let [a, b] = [-1.0, 1.0].map(|side| world.insert(ball(side)));
     world.insert_joint(joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO)));
-    let mut simulation =
-        Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world");
+    let mut simulation = started_world(world);
     run(&mut simulation, 2);
     simulation.substeps_of(0)
 }
 
-/// A substep h at the speed u across a rod of the length d opens it by (h u)²/2d: 1/400 at 34 m/s with 8 substeps.
+/// A substep h at the speed u across a rod of the length d opens it by (h u)²/2d, of which the next substep closes a part.
+/// The promise of 1/400 is below that at 34 m/s with 8 substeps, and between once and twice that at 30 m/s.
 #[test]
 fn a_rod_takes_more_substeps_for_the_speed_across_it_and_a_slack_rope_none() {
     let substeps = |speed: f32| substeps_of_a_rod(0.5 * speed, |joint| joint.rod(1.0));
-    assert_eq!([30.0, 38.0, 72.0].map(substeps), [8, 16, 32]);
+    assert_eq!([24.0, 30.0, 48.0, 60.0].map(substeps), [8, 16, 16, 32]);
     assert_eq!(substeps_of_a_rod(19.0, |joint| joint.rope(1.01)), 16, "the step tightens it");
     assert_eq!(substeps_of_a_rod(19.0, |joint| joint.rope(3.0)), 8, "slack");
+}
+
+fn started_world(world: World) -> Simulation {
+    Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
+}
+
+/// The step in which a joint opens is taken again, so that no step leaves it open beyond the promise.
+#[test]
+fn a_step_that_opens_a_rod_is_taken_again() {
+    let mut world = World::new();
+    world.gravity = Vec3::ZERO;
+    let ball = |side: f32| {
+        let body = Body::dynamic().shape(Shape::ball(0.1)).position(side * 0.5, 0.0, 0.0);
+        body.velocity(Vec3::Y * side * 30.0, Vec3::ZERO)
+    };
+    let [a, b] = [-1.0, 1.0].map(|side| world.insert(ball(side)));
+    world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).rod(1.0));
+    let mut simulation = started_world(world);
+    let repeats: Vec<u32> = (0..60)
+        .map(|step| {
+            let stats = simulation.step(DT).expect("a step");
+            let gap = simulation.world.joint_gap();
+            assert!(gap < 0.0025, "step {step}: {gap} m");
+            stats.repeats
+        })
+        .collect();
+    assert!(repeats[0] > 0 && repeats[1..].iter().sum::<u32>() <= 2, "{repeats:?}");
+}
+
+/// A stack and a chain compute the same bits, whether a rod beside them takes steps again or not.
+#[test]
+fn other_islands_keep_their_bits_when_a_rod_takes_a_step_again() {
+    let run_beside = |speed: f32| {
+        let mut world = World::new();
+        world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+        let box_at = |x: f32, y: f32| Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(x, y, 0.0);
+        let mut watched: Vec<_> =
+            (0..3).map(|i| world.insert(box_at(0.05 * i as f32, 0.21 + 0.41 * i as f32))).collect();
+        let mut hook = None;
+        for i in 0..3 {
+            let link = world.insert(box_at(5.0, 2.8 - 0.4 * i as f32));
+            world.insert_joint(match hook.replace(link) {
+                None => Joint::to_world(link, 0.2 * Vec3::Y, Vec3::new(5.0, 3.0, 0.0)),
+                Some(hook) => Joint::new(hook, -0.2 * Vec3::Y, link, 0.2 * Vec3::Y),
+            });
+            watched.push(link);
+        }
+        let [a, b] = [-1.0, 1.0].map(|side| {
+            let ball = Body::dynamic().shape(Shape::ball(0.1)).position(side * 0.5, 20.0, 5.0);
+            world.insert(ball.velocity(Vec3::Z * side * speed, Vec3::ZERO))
+        });
+        world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).rod(1.0));
+        let mut simulation = started_world(world);
+        let repeats: u32 = (0..60).map(|_| simulation.step(DT).expect("a step").repeats).sum();
+        let state = |&body: &BodyHandle| {
+            let body = &simulation.world.bodies[body];
+            let (rotation, spin) = (body.rotation.to_array(), body.angular_velocity.to_array());
+            let all = [body.position.to_array(), body.linear_velocity.to_array(), spin];
+            all.concat().into_iter().chain(rotation).map(f32::to_bits).collect::<Vec<u32>>()
+        };
+        (repeats, watched.iter().map(state).collect::<Vec<_>>())
+    };
+    let [(none, calm), (some, beside)] = [1.0, 30.0].map(run_beside);
+    assert!(none == 0 && some > 0, "{none} and {some} repeats");
+    assert_eq!(calm, beside);
+}
+
+/// Two joints pull a body apart between two drivers: no substep is short enough to close them.
+#[test]
+fn joints_that_cannot_both_hold_take_no_more_substeps() {
+    let mut world = World::new();
+    let body = world.insert(Body::dynamic().shape(Shape::ball(0.1)));
+    for side in [-1.0, 1.0] {
+        let driver = Body::kinematic().shape(Shape::ball(0.05)).position(side * 0.5, 0.0, 0.0);
+        let driver = world.insert(driver.velocity(Vec3::X * side * 0.1, Vec3::ZERO));
+        world.insert_joint(Joint::new(body, Vec3::X * side * 0.1, driver, Vec3::X * side * -0.4));
+    }
+    let mut simulation = started_world(world);
+    let repeats: u32 = (0..300)
+        .map(|step| {
+            let stats = simulation.step(DT).expect("a step");
+            assert_eq!(simulation.substeps_of(body), 8, "step {step}");
+            stats.repeats
+        })
+        .sum();
+    assert!(simulation.world.joint_gap() > 0.3, "the drivers pull them apart");
+    // One trial, and its return, for each doubling of the gap.
+    assert!((2..40).contains(&repeats), "{repeats}");
 }
 
 /// Sets a cube of a thousand times the mass on a cube; the overlap after four seconds, and the substeps (m).
@@ -197,7 +285,8 @@ fn a_net_that_catches_a_heavy_ball_keeps_its_joints_closed() {
     let fixed = largest_gap(SolverConfig::default().with(|c| c.max_substeps = c.substeps));
     let gap = largest_gap(SolverConfig::default());
     assert!(fixed > 10e-3, "{fixed} m with 8 substeps");
-    assert!(gap < 1e-3, "{gap} m");
+    // The promised gap of a joint with two arms of 0.25 m.
+    assert!(gap < 0.0025 * 0.5, "{gap} m");
 }
 
 /// Towers that fall with 8 substeps stand at the default, and their cubes overlap by half a millimeter at most.

@@ -11,7 +11,7 @@ const LIBRARY: &[&[&str]] = &[
     &["effort", "queries", "load"],
     &["problem"],
     &["kernels", "plan", "metrics", "rest", "sleep"],
-    &["backend", "energy"],
+    &["backend", "energy", "openings"],
     &["simulation"],
     &["batch", "character"],
     &["stages"],

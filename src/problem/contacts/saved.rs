@@ -80,6 +80,7 @@ impl ContactRows {
             classes,
             materials,
             new_bodies: _,
+            before: _,
             hooked,
             sums: _,
             carry: _,
