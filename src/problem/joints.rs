@@ -230,7 +230,8 @@ impl JointRows {
         twists.clone_from(&before.twists);
     }
 
-    /// Measures how far the joints are open after the step that `problem` ran.
+    /// Measures how far the joints are open after the step that `problem` ran. Returns whether an island may need another
+    /// class for the step.
     ///
     /// Gaps that motion opens fall with the square of the substep. A gap was there before if it does not grow, and a
     /// load that cannot be met holds it open if shorter substeps leave it. Neither needs shorter substeps.
@@ -239,10 +240,11 @@ impl JointRows {
         config: &SolverConfig,
         problem: &StepProblem,
         openings: impl Fn(&StepProblem, usize) -> [f64; 2],
-    ) {
+    ) -> bool {
         let Self { openings: all, before: Before { tried, .. }, shares, systems, .. } = self;
         let is_first = tried.is_empty();
         tried.resize(all.len(), 0.0);
+        let mut is_open = false;
         all.iter_mut().for_each(|opening| (opening.need, opening.next) = (0.0, 0.0));
         for &row in problem.rows_of(&problem.joint_colors()) {
             let row = row as usize;
@@ -253,6 +255,7 @@ impl JointRows {
             // Nets swing, so they keep the share of the promise that a lower class has to keep.
             let next = if systems[row] == SWEPT { after.max(2.0 * after - before) / DESCENT_SHARE } else { 0.0 };
             opening.next = next / (share * share);
+            is_open |= after > 1.0;
             if after <= 1.0 {
                 opening.stuck = 0.0;
             } else if !is_first && after > HELPS * was {
@@ -262,6 +265,7 @@ impl JointRows {
                 opening.need = after / (share * share);
             }
         }
+        is_open
     }
 
     /// Adds a system for the anchors and locks of some joints, which sweeps would leave open by `gap`, if it is cheap

@@ -370,7 +370,9 @@ impl Stages {
             return false;
         }
         let changes = timed(&mut stats.times.color, || {
-            joints.measure(config, problem, openings);
+            if !joints.measure(config, problem, openings) {
+                return false;
+            }
             let asleep = sleep.asleep();
             let of_contacts = contacts.interfaces(world, detector, config, dt);
             let interfaces = of_contacts.chain(joints.interfaces(world, asleep));
