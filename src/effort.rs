@@ -288,7 +288,7 @@ impl Effort {
         asleep: &[bool],
         interfaces: impl Iterator<Item = Interface> + Clone,
         dt: f32,
-        next: impl Fn(&Island, u8, u8) -> (u8, u8),
+        next: fn(&Island, u8, u8) -> (u8, u8),
     ) -> bool {
         let bodies = world.bodies.len();
         self.islands.reset(bodies);

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use crate::kernels::axis::{Frames, axis_motion};
+use crate::kernels::axis::{AxisMotion, Frames, axis_motion};
 use crate::kernels::pair::relative_movement;
 use crate::kernels::rows::{Axis, Body, Joint, Mass, Pair};
 use crate::math::dot3;
@@ -17,6 +17,18 @@ pub fn pair_of(problem: &StepProblem, joint: &JointRow) -> Pair<f64> {
     Pair { a, b, mass_a, mass_b, ..Pair::default() }
 }
 
+/// A joint with its frames at the present poses. Programs have this long function once.
+#[inline(never)]
+pub fn frames_of<'a>(pair: &Pair<f64>, joint: &'a Joint<f64>) -> Frames<'a, f64> {
+    Frames::of(pair, joint)
+}
+
+/// The motion of the bodies of a joint along one of its axes. Programs have this long function once.
+#[inline(never)]
+pub fn motion_of(pair: &Pair<f64>, frames: &Frames<f64>, axis: &Axis<f64>) -> AxisMotion<f64> {
+    axis_motion(pair, frames, axis)
+}
+
 /// How far a joint is open before the step and after it: the distance relative to its arms or the angle (rad),
 /// whichever number is larger. The length of a rod or rope counts as an arm.
 pub fn openings(problem: &StepProblem, row: usize) -> [f64; 2] {
@@ -28,11 +40,11 @@ pub fn openings(problem: &StepProblem, row: usize) -> [f64; 2] {
         squares = [joint.gap, now].map(|gap| dot3(gap, gap));
     }
     let mut angles = [0.0_f64; 2];
-    let frames = Frames::of(&pair, &joint);
+    let frames = frames_of(&pair, &joint);
     let mut arms = [row.r_a, row.r_b].map(|arm| f64::from(Vec3::from(arm).length())).iter().sum::<f64>();
     let axes = &problem.axes[row.first_axis as usize..(row.first_axis + row.axis_count) as usize];
     for axis in axes.iter().filter(|axis| axis.is_limit() || axis.is_lock()) {
-        let gaps = [0.0, axis_motion(&pair, &frames, &Axis::load(axis)).moved].map(|moved| gap_after(axis, moved));
+        let gaps = [0.0, motion_of(&pair, &frames, &Axis::load(axis)).moved].map(|moved| gap_after(axis, moved));
         if axis.coordinate == AxisRow::SHIFT {
             arms += f64::from(axis.start);
             squares = [0, 1].map(|i| squares[i] + gaps[i] * gaps[i]);

@@ -6,11 +6,11 @@ use super::{Entry, can_move, ends, moved_by};
 use crate::config::SolverConfig;
 use crate::constants::LAST_BITS;
 use crate::kernels::Rules;
-use crate::kernels::axis::{Frames, axis_inverse_mass, axis_motion, axis_speed};
+use crate::kernels::axis::{axis_inverse_mass, axis_speed};
 use crate::kernels::pair::relative_movement;
 use crate::kernels::rows::{Axis, Body as BodyOf, Joint, Pair};
 use crate::math::dot3;
-use crate::openings::{gap_after, pair_of};
+use crate::openings::{frames_of, gap_after, motion_of, pair_of};
 use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count, stiffness};
 use crate::world::{Body, BodyKind, World};
 
@@ -37,10 +37,10 @@ pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &
             let force = Vec3::from(problem.joint_impulses[row as usize].linear).as_dvec3().length();
             energy += force * dot3(gap, gap).sqrt();
         }
-        let frames = Frames::of(&pair, &of_joint);
+        let frames = frames_of(&pair, &of_joint);
         for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
             let axis = Axis::<f64>::load(&problem.axes[k]);
-            let gap = gap_after(&problem.axes[k], axis_motion(&pair, &frames, &axis).moved);
+            let gap = gap_after(&problem.axes[k], motion_of(&pair, &frames, &axis).moved);
             energy += (axis_impulse(problem, k, &problem.joint_impulses) * gap).abs();
         }
         entries[body as usize].springs += 0.5 * energy / substep(body as usize);
@@ -73,7 +73,7 @@ pub(super) fn add_springs_at_start(
         for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
             let axis = Axis::<f64>::load(&problem.axes[k]);
             let gap = gap_after(&problem.axes[k], 0.0);
-            let motion = axis_motion(&pair, &Frames::of(&pair, &of_joint), &axis);
+            let motion = motion_of(&pair, &frames_of(&pair, &of_joint), &axis);
             energy += 0.5 * (frequency * gap).powi(2) / axis_inverse_mass(&pair, &motion);
         }
         entries[body as usize].kept += energy.min(0.5 * mass * f64::from(config.push_limit).powi(2));
@@ -126,7 +126,7 @@ pub(super) fn add_work_of_drives(
         let start = pair_at_start(&end, world, joint);
         for (number, k) in axes_of(joint).take(drives).enumerate() {
             let axis = Axis::<f64>::load(&problem.axes[k]);
-            let motions = [&start, &end].map(|pair| (pair, axis_motion(pair, &Frames::of(pair, &of_joint), &axis)));
+            let motions = [&start, &end].map(|pair| (pair, motion_of(pair, &frames_of(pair, &of_joint), &axis)));
             let speeds = motions.each_ref().map(|(pair, motion)| axis_speed(Rules::default(), pair, motion));
             if axis.impulse_scale > 0.0 {
                 let h = substep(body as usize);
