@@ -164,7 +164,7 @@ pub fn lasting(now: f32, before: f32) -> f32 {
 
 impl Effort {
     /// The highest class that the settings allow. If the sweeps depend on all bodies together, all have one class.
-    fn highest(config: &SolverConfig) -> u8 {
+    pub fn highest(config: &SolverConfig) -> u8 {
         let is_soft = config.stabilization == Stabilization::Soft;
         if config.method == Method::Accelerated || config.tolerance > 0.0 || !is_soft {
             return 0;

@@ -1,5 +1,5 @@
 //! How far joints are open after a step. If a joint opened beyond the promise, the step is taken again with shorter
-//! substeps (docs/derivation.md, section 5).
+//! substeps (docs/derivation.md, section 7).
 
 use glam::Vec3;
 

@@ -57,7 +57,7 @@ pub struct StepStats {
     /// Number of islands whose step would have added more energy than they have. Their bodies did not move, and they
     /// take shorter substeps from the next step on.
     pub refused: usize,
-    /// How often the step was taken again with shorter substeps, because joints opened beyond the promised gap.
+    /// How often the step was taken again with other substeps, because joints opened beyond the promised gap.
     pub repeats: u32,
     /// Number of completed sweeps if the settings have a tolerance, else 0.
     pub sweeps: u32,

@@ -70,7 +70,7 @@ crate::saved::cloned!(ContactRows {
     carry,
 } scratch { graph, poses, impacts, new_bodies, before });
 
-/// What a step changes before it runs, for a step that is taken again.
+/// The rows that a step changes before it runs, for a step that is taken again.
 #[derive(Debug, Default)]
 struct Before {
     contacts: Vec<ContactRow>,

@@ -95,7 +95,7 @@ struct Opening {
 
 crate::saved::fields!(Opening { need, next, stuck });
 
-/// What a step changes before it runs, for a step that is taken again.
+/// The rows that a step changes before it runs, and the gaps of its last try, for a step that is taken again.
 #[derive(Debug, Default)]
 struct Before {
     impulses: Vec<JointImpulseRow>,
@@ -159,9 +159,11 @@ impl JointRows {
         self.is_colored = false;
     }
 
-    /// Forgets which joints are solved directly, so that they are chosen anew.
+    /// Forgets which joints are solved directly, so that they are chosen anew, and how far they are open: other settings
+    /// promise another gap.
     pub fn forget_systems(&mut self) {
         self.chosen_for = None;
+        self.openings.fill(Opening::default());
     }
 
     /// Chooses the joints that are solved directly, unless the choice is made already. The choice lasts, because a
@@ -231,7 +233,7 @@ impl JointRows {
     }
 
     /// Measures how far the joints are open after the step that `problem` ran. Returns whether an island may need another
-    /// class for the step.
+    /// class for the step. `gaps_of` gives the gaps of a joint before and after the step.
     ///
     /// Gaps that motion opens fall with the square of the substep. A gap was there before if it does not grow, and a
     /// load that cannot be met holds it open if shorter substeps leave it. Neither needs shorter substeps.
@@ -239,18 +241,17 @@ impl JointRows {
         &mut self,
         config: &SolverConfig,
         problem: &StepProblem,
-        openings: impl Fn(&StepProblem, usize) -> [f64; 2],
+        gaps_of: impl Fn(&StepProblem, usize) -> [f64; 2],
     ) -> bool {
-        let Self { openings: all, before: Before { tried, .. }, shares, systems, .. } = self;
+        let Self { openings, before: Before { tried, .. }, shares, systems, .. } = self;
         let is_first = tried.is_empty();
-        tried.resize(all.len(), 0.0);
+        tried.resize(openings.len(), 0.0);
         let mut is_open = false;
-        all.iter_mut().for_each(|opening| (opening.need, opening.next) = (0.0, 0.0));
+        openings.iter_mut().for_each(|opening| (opening.need, opening.next) = (0.0, 0.0));
         for &row in problem.rows_of(&problem.joint_colors()) {
             let row = row as usize;
-            let (opening, share) = (&mut all[row], shares[row]);
-            let [before, after] =
-                openings(problem, row).map(|gap| (gap / f64::from(config.max_joint_gap_share)) as f32);
+            let (opening, share) = (&mut openings[row], shares[row]);
+            let [before, after] = gaps_of(problem, row).map(|gap| (gap / f64::from(config.max_joint_gap_share)) as f32);
             let was = std::mem::replace(&mut tried[row], after);
             // Nets swing, so they keep the share of the promise that a lower class has to keep.
             let next = if systems[row] == SWEPT { after.max(2.0 * after - before) / DESCENT_SHARE } else { 0.0 };

@@ -9,7 +9,7 @@ use super::events::{ColliderOf, Event, Events, Hit, Met};
 use super::hooks::ContactHooks;
 use crate::collide::{Activity, ColliderSide, DetectStats, Detector, PairFilter};
 use crate::config::{FrictionAt, FrictionRule, JointSolver, SolverConfig};
-use crate::effort::Effort;
+use crate::effort::{Effort, Interface};
 use crate::energy::{Energy, Taken};
 use crate::error::{Result, ensure};
 use crate::openings::openings;
@@ -341,17 +341,21 @@ impl Stages {
             }
             let has_new_bodies = contacts.note_new_bodies(world);
             let asleep = sleep.asleep();
-            let of_contacts = || contacts.interfaces(world, detector, config, dt);
-            let interfaces = || of_contacts().chain(joints.interfaces(world, asleep));
+            let interfaces = || interfaces(world, asleep, (detector, contacts, joints), config, dt);
             let is_above = stats.hardest.is_some_and(|hardest| hardest.need > 1.0) || joints.are_above();
             effort.follow(world, asleep, config, dt, is_above, interfaces) || has_new_bodies
         });
         Ok(changes_class || modified.materials)
     }
 
+    /// Whether steps can be taken again: there are joints, and the settings leave the substeps of islands open.
+    fn can_repeat(world: &World, config: &SolverConfig) -> bool {
+        !world.joints.is_empty() && config.joint_solver != JointSolver::Sweeps && Effort::highest(config) > 0
+    }
+
     /// Prepares and plans the step. With `on_device`, the device continues from its own rows.
     pub fn prepare(&mut self, world: &World, config: &SolverConfig, dt: f32, on_device: bool, stats: &mut StepStats) {
-        if !world.joints.is_empty() {
+        if Self::can_repeat(world, config) {
             let Self { contacts, joints, problem, .. } = self;
             timed(&mut stats.times.prepare, || {
                 contacts.keep(problem);
@@ -364,9 +368,11 @@ impl Stages {
     /// Prepares the step that ran once more, with shorter substeps for the islands with joints that opened beyond the
     /// promise. Returns false if there are none: the step is done.
     pub fn prepare_again(&mut self, world: &World, config: &SolverConfig, dt: f32, stats: &mut StepStats) -> bool {
+        if !Self::can_repeat(world, config) || stats.repeats >= EFFORT_CLASSES as u32 {
+            return false;
+        }
         let Self { detector, sleep, effort, contacts, joints, problem, .. } = self;
-        let is_fixed = config.joint_solver == JointSolver::Sweeps || stats.repeats >= EFFORT_CLASSES as u32;
-        if is_fixed || problem.rows_of(&problem.joint_colors()).is_empty() {
+        if problem.rows_of(&problem.joint_colors()).is_empty() {
             return false;
         }
         let changes = timed(&mut stats.times.color, || {
@@ -374,8 +380,7 @@ impl Stages {
                 return false;
             }
             let asleep = sleep.asleep();
-            let of_contacts = contacts.interfaces(world, detector, config, dt);
-            let interfaces = of_contacts.chain(joints.interfaces(world, asleep));
+            let interfaces = interfaces(world, asleep, (detector, contacts, joints), config, dt);
             effort.correct(world, asleep, dt, stats.repeats == 0, interfaces)
         });
         if changes {
@@ -514,6 +519,17 @@ impl Stages {
         self.sleep.after_step(world, &self.detector, &self.key.config, dt);
         taken
     }
+}
+
+/// The contacts and joints between awake bodies, for the effort of their islands.
+fn interfaces<'a>(
+    world: &'a World,
+    asleep: &'a [bool],
+    (detector, contacts, joints): (&'a Detector, &'a ContactRows, &'a JointRows),
+    config: &'a SolverConfig,
+    dt: f32,
+) -> impl Iterator<Item = Interface> + Clone + 'a {
+    contacts.interfaces(world, detector, config, dt).chain(joints.interfaces(world, asleep))
 }
 
 /// Refuses materials that the settings cannot follow.

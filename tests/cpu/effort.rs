@@ -2,7 +2,7 @@
 
 use crate::common::efforts;
 use crate::common::state::joint_impulses;
-use drystone::config::{Method, Stabilization};
+use drystone::config::{JointSolver, Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{in_place, rms_speed};
 use drystone::stages::backend::CheckedStep;
@@ -48,9 +48,13 @@ fn a_cube_bears_one_of_a_million_times_its_mass() {
     }
 }
 
-/// The substeps of two balls at a distance of 1 m on a rod or a rope, after two steps. They begin across it at this speed each, one this way
-/// and one that way.
-fn substeps_of_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> u32 {
+fn started_world(world: World) -> Simulation {
+    Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
+}
+
+/// Two balls at a distance of 1 m on a rod or a rope. They begin across it at this speed each, one this way and one that
+/// way.
+fn across_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> Simulation {
     let mut world = World::new();
     world.gravity = Vec3::ZERO;
     let ball = |side: f32| {
@@ -59,7 +63,12 @@ fn substeps_of_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> u32 {
     };
     let [a, b] = [-1.0, 1.0].map(|side| world.insert(ball(side)));
     world.insert_joint(joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO)));
-    let mut simulation = started_world(world);
+    started_world(world)
+}
+
+/// The substeps of these balls after two steps.
+fn substeps_of_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> u32 {
+    let mut simulation = across_a_rod(speed, joint);
     run(&mut simulation, 2);
     simulation.substeps_of(0)
 }
@@ -74,22 +83,10 @@ fn a_rod_takes_more_substeps_for_the_speed_across_it_and_a_slack_rope_none() {
     assert_eq!(substeps_of_a_rod(19.0, |joint| joint.rope(3.0)), 8, "slack");
 }
 
-fn started_world(world: World) -> Simulation {
-    Simulation::with(world, SolverConfig::default().without_sleep(), Box::new(Cpu::new())).expect("a good world")
-}
-
 /// The step in which a joint opens is taken again, so that no step leaves it open beyond the promise.
 #[test]
 fn a_step_that_opens_a_rod_is_taken_again() {
-    let mut world = World::new();
-    world.gravity = Vec3::ZERO;
-    let ball = |side: f32| {
-        let body = Body::dynamic().shape(Shape::ball(0.1)).position(side * 0.5, 0.0, 0.0);
-        body.velocity(Vec3::Y * side * 30.0, Vec3::ZERO)
-    };
-    let [a, b] = [-1.0, 1.0].map(|side| world.insert(ball(side)));
-    world.insert_joint(Joint::new(a, Vec3::ZERO, b, Vec3::ZERO).rod(1.0));
-    let mut simulation = started_world(world);
+    let mut simulation = across_a_rod(30.0, |joint| joint.rod(1.0));
     let repeats: Vec<u32> = (0..60)
         .map(|step| {
             let stats = simulation.step(DT).expect("a step");
@@ -99,6 +96,18 @@ fn a_step_that_opens_a_rod_is_taken_again() {
         })
         .collect();
     assert!(repeats[0] > 0 && repeats[1..].iter().sum::<u32>() <= 2, "{repeats:?}");
+}
+
+/// Sweeps promise no gap, so the gaps of the direct solution before them ask for no substeps.
+#[test]
+fn joints_that_are_swept_from_now_on_return_to_the_substeps_of_the_settings() {
+    let mut simulation = across_a_rod(30.0, |joint| joint.rod(1.0));
+    run(&mut simulation, 2);
+    assert!(simulation.substeps_of(0) > 8, "{} substeps", simulation.substeps_of(0));
+    let swept = simulation.config().clone().with(|c| c.joint_solver = JointSolver::Sweeps);
+    simulation.set_config(swept).expect("good settings");
+    run(&mut simulation, 120);
+    assert_eq!(simulation.substeps_of(0), 8);
 }
 
 /// A stack and a chain compute the same bits, whether a rod beside them takes steps again or not.
@@ -112,7 +121,7 @@ fn other_islands_keep_their_bits_when_a_rod_takes_a_step_again() {
             (0..3).map(|i| world.insert(box_at(0.05 * i as f32, 0.21 + 0.41 * i as f32))).collect();
         let mut hook = None;
         for i in 0..3 {
-            let link = world.insert(box_at(5.0, 2.8 - 0.4 * i as f32));
+            let link = world.insert(box_at(5.0, 2.8 - 0.4 * i as f32).velocity(0.3 * Vec3::Z, Vec3::ZERO));
             world.insert_joint(match hook.replace(link) {
                 None => Joint::to_world(link, 0.2 * Vec3::Y, Vec3::new(5.0, 3.0, 0.0)),
                 Some(hook) => Joint::new(hook, -0.2 * Vec3::Y, link, 0.2 * Vec3::Y),
@@ -125,7 +134,7 @@ fn other_islands_keep_their_bits_when_a_rod_takes_a_step_again() {
         let mut simulation = started_world(world);
         let mut repeats = 0;
         for step in 0..60 {
-            // The stack lies on the floor, and the chain hangs.
+            // The stack lies on the floor, and the chain swings.
             if step == 12 {
                 simulation.world.bodies[a].linear_velocity += Vec3::NEG_Z * speed;
                 simulation.world.bodies[b].linear_velocity += Vec3::Z * speed;
@@ -183,15 +192,11 @@ fn what_walls_hold_takes_no_more_substeps_than_its_weight_asks_for() {
     let mut world = World::new();
     world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     let cube = world.insert(Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).position(0.0, 0.2, 0.0));
-    let start = |world: World| {
-        let config = SolverConfig::default().without_sleep();
-        Simulation::with(world, config, Box::new(Cpu::new())).expect("a good world")
-    };
     let mut free = world.clone();
     let wall = |x: f32| Body::fixed().shape(Shape::cuboid(0.5, 1.0, 1.0)).position(x, 1.0, 0.0);
     world.insert(wall(-0.65));
     let right = world.insert(wall(0.65));
-    let mut simulation = start(world);
+    let mut simulation = started_world(world);
     for step in 0..600 {
         run(&mut simulation, 1);
         assert_eq!(simulation.substeps_of(cube), 8, "step {step}");
@@ -202,7 +207,7 @@ fn what_walls_hold_takes_no_more_substeps_than_its_weight_asks_for() {
     run(&mut simulation, 60);
     free.bodies[cube] = simulation.world.bodies[cube].clone();
     let (held, substeps) = loaded(&mut simulation, cube);
-    let mut free = start(free);
+    let mut free = started_world(free);
     run(&mut free, 60);
     let (never_held, expected) = loaded(&mut free, cube);
     assert!(substeps >= 32 && substeps == expected, "{substeps} and {expected} substeps");
