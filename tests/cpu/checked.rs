@@ -3,7 +3,7 @@
 use crate::common::settings::set;
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::plan::{Kernel, Pass};
-use drystone::stages::problem::{AxisRow, ContactRow, DampingRow, InertiaRow, JointImpulseRow, TorqueRow};
+use drystone::stages::problem::{AxisRow, DampingRow, InertiaRow, JointImpulseRow, TorqueRow};
 use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig, StepPlan, StepProblem};
 use drystone_scenes::Scene;
 
@@ -180,9 +180,10 @@ fn what_is_not_there_is_refused_by_row_and_field() {
         ("order: body 999999, but there are", |p, _| put(p, 2, 0, 999_999)),
         ("order: body 0 occurs twice", |p, _| put(p, 2, 1, 0)),
         ("color 0: body", |p, _| {
-            let [first, second] = [0, 1].map(|k| p.order[k] as usize);
-            let ContactRow { body_a, body_b, .. } = p.contacts[first];
-            (p.contacts[second].body_a, p.contacts[second].body_b) = (body_a, body_b);
+            // All contacts in one color.
+            p.order = (0..p.contacts.len() as u32).collect();
+            p.colors = vec![0, p.order.len() as u32];
+            p.in_one_block(1, p.blocks[0].substep);
         }),
     ];
     for (start, spoil) in cases {

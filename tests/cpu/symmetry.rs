@@ -300,8 +300,8 @@ fn a_small_world_moves_as_a_large_one_but_for_rounding() {
     }
 }
 
-/// No constraint is swept before another one than before: single towers, chains and machines keep all bits. The law of
-/// energy sums over the bodies of an island in their order, which rounds otherwise once the ragdoll has landed.
+/// No constraint is swept before another one than before: single towers, chains and machines keep all bits. The shins of the ragdoll meet
+/// along a line in step 83: capsules in the other order have the two points of such a contact in the other order, which rounds otherwise.
 #[test]
 fn another_order_of_bodies_keeps_the_bits_of_chains_and_towers() {
     for spec in ["tower:n=5", "chain:links=6", "four-bar", "car", "drawbridge", "sphere-plane"] {
@@ -310,7 +310,7 @@ fn another_order_of_bodies_keeps_the_bits_of_chains_and_towers() {
     // Solved at once, its joints are eliminated in another order.
     let mut ragdoll = Case::scene("ragdoll");
     ragdoll.config.joint_solver = JointSolver::Sweeps;
-    assert_apart("ragdoll, in the opposite order", &ragdoll, &reordered(), 50, 0.0);
+    assert_apart("ragdoll, in the opposite order", &ragdoll, &reordered(), 82, 0.0);
     assert_apart("five shapes, in the opposite order", &fall(), &reordered(), 300, 0.0);
 }
 

@@ -19,6 +19,9 @@ fn a_ball_bounces_only_if_it_comes_faster_than_the_threshold() {
 #[test]
 fn a_joint_is_the_damped_spring_that_its_settings_say() {
     for (frequency, damping) in [(0.02, 0.3), (0.02, 3.0), (0.1, 0.1)] {
+        let mut world = empty();
+        let hung = world.insert(ball().position(0.1, 0.0, 0.0));
+        world.insert_joint(Joint::to_world(hung, Vec3::ZERO, Vec3::ZERO));
         let h = DT / 4.0;
         let config = SolverConfig::default().without_sleep().with(|c| {
             c.substeps = 4;
@@ -29,13 +32,9 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
             // The limit bounds the energy of a body that begins away from its joint.
             c.push_limit = 100.0;
         });
+        let mut simulation = simulation(world, config);
         let (w, mut x, mut v) = (2.0 * PI * frequency / h, 0.1_f32, 0.0_f32);
         for step in 1..=20 {
-            // Each step begins anew, because only a joint that begins open gives the energy of its spring.
-            let mut world = empty();
-            let hung = world.insert(ball().position(x, 0.0, 0.0).velocity(v * Vec3::X, Vec3::ZERO));
-            world.insert_joint(Joint::to_world(hung, Vec3::ZERO, Vec3::ZERO));
-            let mut simulation = simulation(world, config.clone());
             run(&mut simulation, 1, DT);
             for _ in 0..4 {
                 v = (v - h * w * w * x) / (1.0 + 2.0 * damping * w * h + (w * h) * (w * h));
@@ -43,7 +42,6 @@ fn a_joint_is_the_damped_spring_that_its_settings_say() {
             }
             let body = &simulation.world.bodies[hung];
             near(&format!("{frequency}, {damping}, step {step} [m]"), body.position.x, x, 2e-5);
-            near(&format!("{frequency}, {damping}, step {step} [m/s]"), body.linear_velocity.x, v, 2e-3);
         }
     }
 }

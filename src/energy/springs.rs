@@ -1,21 +1,56 @@
-//! The work of driven bodies, drives and new joints.
+//! The energy in the springs of joints and contacts, and the work of driven bodies and drives.
 
 use glam::{Quat, Vec3};
 
-use super::{Entry, can_move, ends};
+use super::{Entry, can_move, ends, moved_by};
 use crate::config::SolverConfig;
+use crate::constants::LAST_BITS;
 use crate::kernels::Rules;
 use crate::kernels::axis::{axis_inverse_mass, axis_speed};
+use crate::kernels::pair::relative_movement;
 use crate::kernels::rows::{Axis, Body as BodyOf, Joint, Pair};
 use crate::math::dot3;
 use crate::openings::{frames_of, gap_after, motion_of, pair_of};
-use crate::problem::{BodyRow, ContactRow, JointRow, StepProblem, Substep, drive_count, stiffness};
+use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count, stiffness};
 use crate::world::{Body, BodyKind, World};
+
+/// Adds the energy that the springs of joints hold now, half of force times gap each, and records the levers of joints.
+pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &World, substep: impl Fn(usize) -> f64) {
+    for &row in problem.rows_of(&problem.joint_colors()) {
+        let joint = &problem.joints[row as usize];
+        let Some(body) = ends(joint).into_iter().find(|&b| can_move(problem, b)) else { continue };
+        let lever =
+            [joint.r_a, joint.r_b].map(|arm| f64::from(Vec3::from(arm).length())).into_iter().fold(0.0, f64::max);
+        entries[body as usize].lever = entries[body as usize].lever.max(lever);
+        for (end, arm) in ends(joint).into_iter().zip([joint.r_a, joint.r_b]).filter(|(end, _)| can_move(problem, *end))
+        {
+            let mass = &problem.masses[end as usize];
+            let weight = f64::from(Vec3::from(mass.acceleration).length() / mass.inv_mass);
+            let rest = weight * LAST_BITS * f64::from(Vec3::from(arm).length());
+            let entry = &mut entries[end as usize];
+            (entry.rest, entry.slack) = (entry.rest + rest, entry.slack + rest);
+        }
+        let (of_joint, pair) = (Joint::<f64>::load(joint), pair_of(problem, joint));
+        let mut energy = 0.0;
+        if joint.is_loose == 0.0 {
+            let gap = of_joint.gap + relative_movement(&pair, of_joint.r_a, of_joint.r_b);
+            let force = Vec3::from(problem.joint_impulses[row as usize].linear).as_dvec3().length();
+            energy += force * dot3(gap, gap).sqrt();
+        }
+        let frames = frames_of(&pair, &of_joint);
+        for k in axes_of(joint).skip(drive_count(&world.joints[row as usize])) {
+            let axis = Axis::<f64>::load(&problem.axes[k]);
+            let gap = gap_after(&problem.axes[k], motion_of(&pair, &frames, &axis).moved);
+            energy += (axis_impulse(problem, k, &problem.joint_impulses) * gap).abs();
+        }
+        entries[body as usize].springs += 0.5 * energy / substep(body as usize);
+    }
+}
 
 /// Adds the energy that the springs of joints of new bodies, and of new joints, held at the start of the step: m (w
 /// gap)²/2, where m is the moved mass and w the frequency, but at most the energy at the separation speed `push_limit`.
 /// `fresh` has the bodies in ascending order.
-pub(super) fn add_new_joints(
+pub(super) fn add_springs_at_start(
     entries: &mut [Entry],
     problem: &StepProblem,
     world: &World,
@@ -41,13 +76,18 @@ pub(super) fn add_new_joints(
             let motion = motion_of(&pair, &frames_of(&pair, &of_joint), &axis);
             energy += 0.5 * (frequency * gap).powi(2) / axis_inverse_mass(&pair, &motion);
         }
-        entries[body as usize].work += energy.min(0.5 * mass * f64::from(config.push_limit).powi(2));
+        entries[body as usize].kept += energy.min(0.5 * mass * f64::from(config.push_limit).powi(2));
     }
 }
 
 /// Adds the work of driven bodies and of the drives of joints. The work of a motor is its impulse times the faster of
 /// the two speeds of its axis. A spring of the caller gives back the energy of its deflection.
-pub(super) fn add_drives(entries: &mut [Entry], problem: &StepProblem, world: &World, substep: impl Fn(usize) -> f64) {
+pub(super) fn add_work_of_drives(
+    entries: &mut [Entry],
+    problem: &StepProblem,
+    world: &World,
+    substep: impl Fn(usize) -> f64,
+) {
     let driver = |body: u32| world.bodies.get(body as usize).filter(|b| b.kind != BodyKind::Dynamic && b.is_driven());
     if !problem.totals.is_empty() {
         for contact in problem.swept_contacts() {
@@ -61,8 +101,7 @@ pub(super) fn add_drives(entries: &mut [Entry], problem: &StepProblem, world: &W
     }
     if problem.params.driven != 0 {
         for contact in problem.swept_contacts() {
-            let body = if can_move(problem, contact.body_a) { contact.body_a } else { contact.body_b };
-            entries[body as usize].work += work_of_surfaces(contact, problem);
+            entries[moved_by(problem, contact)].work += work_of_surfaces(contact, problem);
         }
     }
     for &row in problem.rows_of(&problem.joint_colors()) {
@@ -97,7 +136,7 @@ pub(super) fn add_drives(entries: &mut [Entry], problem: &StepProblem, world: &W
                 let [before, after] = places.map(|place| held_by_drive(stiffness, axis.max_impulse / h, place));
                 work += before - after;
             } else {
-                let impulse = f64::from(problem.joint_totals[problem.joints.len() + k].linear[0]);
+                let impulse = axis_impulse(problem, k, &problem.joint_totals);
                 work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);
             }
         }
@@ -113,6 +152,10 @@ fn held_by_drive(stiffness: f64, most: f64, deflection: f64) -> f64 {
 
 fn axes_of(joint: &JointRow) -> std::ops::Range<usize> {
     joint.first_axis as usize..(joint.first_axis + joint.axis_count) as usize
+}
+
+fn axis_impulse(problem: &StepProblem, axis: usize, impulses: &[JointImpulseRow]) -> f64 {
+    f64::from(impulses[problem.joints.len() + axis].linear[0])
 }
 
 /// The bodies of a joint at the start of the step.
