@@ -1,6 +1,7 @@
 //! The law that constraints add no energy: contacts, joints, their springs, limits and preloads only transfer or remove
-//! energy. A step adds to the kinetic energy of an island at most the work of gravity, forces and drives, plus the
-//! energy that the springs of joints and contacts give back. If an island has more, its velocities are reduced to that
+//! energy. A step adds to the kinetic energy of an island at most the work of gravity, forces and drives, the energy
+//! that springs of contacts between bodies without joints give back, and energy that the island lost before: 0.1 % of
+//! its motion, and what the springs of its swept joints hold. If an island has more, its velocities are reduced to that
 //! energy. Momentum is conserved unless something outside holds the island.
 //!
 //! A constraint with the impulse J that changes velocities from v to v' adds J·(v + v')/2 to the kinetic energy, so
@@ -20,15 +21,15 @@ use crate::error::{Result, ensure};
 use crate::graph::Islands;
 use crate::math::rotation::{product, unit};
 use crate::problem::damping::Decay;
-use crate::problem::{BodyRow, ContactRow, InverseMass, JointImpulseRow, JointRow, StepProblem, pose_after};
+use crate::problem::{BodyRow, JointImpulseRow, JointRow, StepProblem, pose_after};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
 
 /// The energy accounts of all islands.
 #[derive(Debug, Default)]
 pub struct Energy {
-    /// One entry for each body.
-    kept: Vec<Kept>,
+    /// The part of its losses that each body can regain (J).
+    reserves: Vec<f32>,
     entries: Vec<Entry>,
     /// The islands of contacts and joints, each with its account.
     islands: Islands,
@@ -47,11 +48,11 @@ pub struct Energy {
 
 impl Clone for Energy {
     fn clone(&self) -> Self {
-        Self { kept: self.kept.clone(), ..Self::default() }
+        Self { reserves: self.reserves.clone(), ..Self::default() }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        self.kept.clone_from(&from.kept);
+        self.reserves.clone_from(&from.reserves);
         self.are_known = false;
     }
 }
@@ -59,31 +60,18 @@ impl Clone for Energy {
 /// The island of a body without contacts and joints.
 const UNTOUCHED: u32 = u32::MAX;
 
-/// The energies that a body keeps from step to step (J).
-#[derive(Clone, Copy, Debug, Default)]
-struct Kept {
-    /// The part of its losses that it can regain.
-    reserve: f32,
-    /// The energy in the springs of its joints, and of the contacts of jointed bodies.
-    springs: f32,
-}
-
-crate::saved::fields!(Kept { reserve, springs });
-
 /// The energies of a body, or of an island, in a step (J).
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry {
     /// Kinetic energy at the start of the step, and at its end.
     before: f64,
     after: f64,
-    /// Work of gravity, forces and drives.
+    /// Work of gravity, forces and drives, and of new joints that begin open.
     work: f64,
     /// The part of earlier losses that can be regained, and the largest such part from this step on.
     reserve: f64,
     slack: f64,
-    /// Energy that the springs of joints, and of contacts of jointed bodies, held before; and the energy that they hold
-    /// now, including the energy of stiffness inertia.
-    kept: f64,
+    /// The part of `slack` that the springs of swept joints hold.
     springs: f64,
     /// Kinetic energy below which motion counts as rest.
     rest: f64,
@@ -115,12 +103,12 @@ impl Common {
 impl Entry {
     /// Energy that the motion lost; below zero if constraints added energy.
     fn left(&self) -> f64 {
-        self.given() - self.after
+        self.before + self.work + self.reserve - self.after
     }
 
-    /// Energy that the motion had at the start and received.
-    fn given(&self) -> f64 {
-        self.before + self.work + self.reserve + self.kept
+    /// The part of that energy, and of the energy `released` by springs, that the motion can regain.
+    fn kept(&self, released: f64) -> f64 {
+        (self.left() + released).min(self.slack).max(0.0)
     }
 
     fn add(&mut self, other: &Self) {
@@ -128,9 +116,8 @@ impl Entry {
         self.after += other.after;
         self.work += other.work;
         self.reserve += other.reserve;
-        self.kept += other.kept;
-        self.springs += other.springs;
         self.slack += other.slack;
+        self.springs += other.springs;
         self.rest += other.rest;
         self.rounding += other.rounding;
         self.lever = self.lever.max(other.lever);
@@ -144,7 +131,7 @@ impl Entry {
         self.work -= force.dot(moved) / mass;
         // Rounding of the total velocity affects the relative motion.
         self.rounding *= (self.before.max(0.0) / whole).sqrt().min(1.0);
-        self.slack = REGAINED * self.after.max(0.0) + self.rest;
+        self.slack -= REGAINED * after;
         self.reserve = self.reserve.min(self.slack);
     }
 }
@@ -163,8 +150,8 @@ struct Account {
     /// Whether anything outside the island holds it.
     is_held: bool,
     is_refused: bool,
-    /// The share of spring energy that its bodies keep, and the share of their largest reserves that they have.
-    shares: [f64; 2],
+    /// The share of their largest reserves that its bodies have.
+    share: f64,
 }
 
 impl Account {
@@ -197,12 +184,11 @@ impl Saved for Energy {
 
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         self.are_known &= !A::READS;
-        let bodies = archive.count(self.kept.len())?;
-        self.kept.resize(bodies, Kept::default());
+        let bodies = archive.count(self.reserves.len())?;
+        self.reserves.resize(bodies, 0.0);
         archive.runs(bodies, |i, archive| {
-            self.kept[i].walk(archive)?;
-            let Kept { reserve, springs } = self.kept[i];
-            ensure(reserve >= 0.0 && springs >= 0.0, || format!("body {i} keeps {reserve} J and {springs} J"))
+            self.reserves[i].walk(archive)?;
+            ensure(self.reserves[i] >= 0.0, || format!("body {i} can regain {} J", self.reserves[i]))
         })
     }
 }
@@ -215,9 +201,9 @@ impl Energy {
 
     /// Updates bodies that were added or removed, or that changed kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
-        self.kept.resize(world.bodies.len(), Kept::default());
+        self.reserves.resize(world.bodies.len(), 0.0);
         for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
-            self.kept[i] = Kept::default();
+            self.reserves[i] = 0.0;
             self.fresh.push(i);
         }
     }
@@ -247,28 +233,25 @@ impl Energy {
         config: &SolverConfig,
         dt: f32,
     ) -> Taken {
-        self.fresh.extend(self.kept.len()..world.bodies.len());
-        self.kept.resize(world.bodies.len(), Kept::default());
+        self.fresh.extend(self.reserves.len()..world.bodies.len());
+        self.reserves.resize(world.bodies.len(), 0.0);
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
         let entry = |(i, body): (usize, &Body)| Entry {
-            reserve: self.kept[i].reserve.into(),
-            kept: self.kept[i].springs.into(),
+            reserve: self.reserves[i].into(),
             ..entry(body, i, problem, dt.into(), substep(i), lag(&self.jointed, problem, effort, i))
         };
         world.bodies.par_iter().with_min_len(256).enumerate().map(entry).collect_into_vec(&mut self.entries);
-        self.add_energy_of_stiffness_inertia(world, problem);
+        add_levers(&mut self.entries, problem);
         springs::add_springs(&mut self.entries, problem, world, substep);
-        self.add_contacts_of_jointed(problem, effort);
         self.fresh.sort_unstable();
         // The first rounding of a position may be a gain.
         self.fresh.iter().for_each(|&i| self.entries[i].reserve = self.entries[i].reserve.max(self.entries[i].rest));
         springs::add_springs_at_start(&mut self.entries, problem, world, config, &self.fresh, substep);
         self.fresh.clear();
         springs::add_work_of_drives(&mut self.entries, problem, world, substep);
-        let is_fine = |entry: &Entry| entry.left() + entry.rounding >= entry.springs;
-        if self.entries.iter().all(is_fine) {
-            let all = self.kept.iter_mut().zip(&self.entries);
-            all.for_each(|(kept, entry)| *kept = Kept::of(entry, entry.left()));
+        if self.entries.iter().all(|entry| entry.left() + entry.rounding >= entry.springs) {
+            let all = self.reserves.iter_mut().zip(&self.entries);
+            all.for_each(|(reserve, entry)| *reserve = entry.kept(0.0) as f32);
             return Taken::default();
         }
         self.join(world, problem);
@@ -278,34 +261,15 @@ impl Energy {
             self.add_released(problem, effort);
             taken = self.settle(world, problem, effort, config, dt);
         }
-        let share = |of: f32, sum: f64| if sum > 0.0 { f64::from(of) / sum } else { 0.0 };
         for account in &mut self.accounts {
-            let Account { all, slack, released, .. } = account;
-            let Kept { springs, reserve } = Kept::of(all, all.left() + *released);
-            account.shares = [share(springs, all.springs), share(reserve, *slack)];
+            let kept = account.all.kept(account.released);
+            account.share = if account.slack > 0.0 { kept / account.slack } else { 0.0 };
         }
-        for (i, (kept, &number)) in self.kept.iter_mut().zip(&self.numbers).enumerate() {
-            let [springs, reserve] =
-                self.accounts.get(number as usize).map(|account| account.shares).unwrap_or_default();
-            // An exploded step can leave springs at NaN.
-            kept.springs = if springs > 0.0 { (springs * self.entries[i].springs) as f32 } else { 0.0 };
-            kept.reserve = (reserve * self.entries[i].slack) as f32;
+        for (i, (reserve, &number)) in self.reserves.iter_mut().zip(&self.numbers).enumerate() {
+            let share = self.accounts.get(number as usize).map_or(0.0, |account| account.share);
+            *reserve = (share * self.entries[i].slack).max(0.0) as f32;
         }
         taken
-    }
-
-    /// Adds the energy of the stiffness inertia of this step to the energy of the springs of its bodies. It counts
-    /// only as far as the motion lost it, because this inertia is gone in the next step.
-    fn add_energy_of_stiffness_inertia(&mut self, world: &World, problem: &StepProblem) {
-        for row in &problem.turning {
-            let i = row.body as usize;
-            let (body, entry) = (&world.bodies[i], &mut self.entries[i]);
-            let inertia = InverseMass::of(&problem.masses[i]).inertia.as_dmat3().inverse();
-            let added = inertia - body.mass.world_inertia(body.rotation).as_dmat3();
-            // The inertia rotates with the body.
-            let spin = (turn_of(&problem.bodies[i]).inverse() * Vec3::from(problem.bodies[i].w)).as_dvec3();
-            entry.springs += (0.5 * spin.dot(added * spin)).max(0.0);
-        }
     }
 
     /// Finds the islands of bodies that contacts and joints connect.
@@ -378,23 +342,15 @@ impl Energy {
         free.for_each(|account| account.all.leave_out(account.common));
     }
 
-    /// Adds the energy in the springs of contacts of jointed bodies. Joints and contacts can push against each other
-    /// without an end, so the springs of these contacts have a budget, too.
-    fn add_contacts_of_jointed(&mut self, problem: &StepProblem, effort: &Effort) {
-        if problem.rows_of(&problem.joint_colors()).is_empty() {
-            return;
-        }
-        for contact in problem.swept_contacts().filter(|contact| is_jointed(&self.jointed, contact)) {
-            let body = moved_by(problem, contact);
-            let substep = &problem.blocks[effort.block_of(body)].substep;
-            self.entries[body].springs += springs::held_by_contact(problem, contact, substep)[1];
-        }
-    }
-
-    /// Adds the energy that the springs of other contacts gave back, in islands that gained energy without it.
+    /// Adds the energy that the springs of contacts between bodies without joints gave back, in islands that gained
+    /// energy. Joints and contacts can push against each other without an end, so springs of jointed bodies give nothing.
     fn add_released(&mut self, problem: &StepProblem, effort: &Effort) {
-        for contact in problem.swept_contacts().filter(|contact| !is_jointed(&self.jointed, contact)) {
-            let body = moved_by(problem, contact);
+        for contact in problem.swept_contacts() {
+            let [a, b] = [contact.body_a as usize, contact.body_b as usize];
+            if self.jointed[a] || self.jointed[b] {
+                continue;
+            }
+            let body = if can_move(problem, contact.body_a) { a } else { b };
             let account = &mut self.accounts[self.numbers[body] as usize];
             if account.all.left() < 0.0 {
                 let [before, after] =
@@ -436,11 +392,10 @@ impl Energy {
                 *is_refused = true;
                 let is_finer = effort.refine(members.clone());
                 stand_still(world, problem, members, dt.into(), *is_held, is_finer);
-                all.springs = 0.0;
             }
             // No energy is left over.
             *released = 0.0;
-            all.after = all.given();
+            all.after += all.left();
         }
         if taken.refused > 0 {
             self.forget_impulses(problem);
@@ -467,32 +422,29 @@ impl Energy {
     }
 }
 
-impl Kept {
-    /// The kept energies if the motion lost `left`.
-    fn of(entry: &Entry, left: f64) -> Self {
-        let springs = left.min(entry.springs).max(0.0);
-        Self { springs: springs as f32, reserve: (left - springs).min(entry.slack).max(0.0) as f32 }
-    }
-}
-
 /// Whether constraints can move a body.
 fn can_move(problem: &StepProblem, body: u32) -> bool {
     problem.masses.get(body as usize).is_some_and(|mass| mass.inv_mass > 0.0)
 }
 
-/// The movable body of a contact; the first one if both are movable.
-fn moved_by(problem: &StepProblem, contact: &ContactRow) -> usize {
-    let [a, b] = [contact.body_a, contact.body_b];
-    if can_move(problem, a) { a as usize } else { b as usize }
-}
-
-/// Whether a joint holds one of the bodies of a contact.
-fn is_jointed(jointed: &[bool], contact: &ContactRow) -> bool {
-    jointed[contact.body_a as usize] || jointed[contact.body_b as usize]
-}
-
 fn ends(joint: &JointRow) -> [u32; 2] {
     [joint.body_a, joint.body_b]
+}
+
+/// Records the levers of joints, and what rounding of their ends can add.
+fn add_levers(entries: &mut [Entry], problem: &StepProblem) {
+    for &row in problem.rows_of(&problem.joint_colors()) {
+        let joint = &problem.joints[row as usize];
+        let arms = [joint.r_a, joint.r_b].map(|arm| f64::from(Vec3::from(arm).length()));
+        for (end, arm) in ends(joint).into_iter().zip(arms).filter(|(end, _)| can_move(problem, *end)) {
+            let mass = &problem.masses[end as usize];
+            let weight = f64::from(Vec3::from(mass.acceleration).length() / mass.inv_mass);
+            let rest = weight * LAST_BITS * arm;
+            let entry = &mut entries[end as usize];
+            entry.lever = arms.into_iter().fold(entry.lever, f64::max);
+            (entry.rest, entry.slack) = (entry.rest + rest, entry.slack + rest);
+        }
+    }
 }
 
 /// The account of a body, with the work of gravity and forces.

@@ -2,9 +2,8 @@
 
 use glam::{Quat, Vec3};
 
-use super::{Entry, can_move, ends, moved_by};
+use super::{Entry, can_move, ends};
 use crate::config::SolverConfig;
-use crate::constants::LAST_BITS;
 use crate::kernels::Rules;
 use crate::kernels::axis::{axis_inverse_mass, axis_speed};
 use crate::kernels::pair::relative_movement;
@@ -14,22 +13,13 @@ use crate::openings::{frames_of, gap_after, motion_of, pair_of};
 use crate::problem::{BodyRow, ContactRow, JointImpulseRow, JointRow, StepProblem, Substep, drive_count, stiffness};
 use crate::world::{Body, BodyKind, World};
 
-/// Adds the energy that the springs of joints hold now, half of force times gap each, and records the levers of joints.
+/// Adds the energy that the springs of swept joints hold now, half of force times gap each. It can be regained. Sweeps
+/// leave gaps that open and close while the bodies move. Direct solutions leave none, so their springs give nothing
+/// back.
 pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &World, substep: impl Fn(usize) -> f64) {
-    for &row in problem.rows_of(&problem.joint_colors()) {
+    for &row in problem.blocks.iter().flat_map(|block| problem.rows_of(&(block.joints[0]..block.direct))) {
         let joint = &problem.joints[row as usize];
         let Some(body) = ends(joint).into_iter().find(|&b| can_move(problem, b)) else { continue };
-        let lever =
-            [joint.r_a, joint.r_b].map(|arm| f64::from(Vec3::from(arm).length())).into_iter().fold(0.0, f64::max);
-        entries[body as usize].lever = entries[body as usize].lever.max(lever);
-        for (end, arm) in ends(joint).into_iter().zip([joint.r_a, joint.r_b]).filter(|(end, _)| can_move(problem, *end))
-        {
-            let mass = &problem.masses[end as usize];
-            let weight = f64::from(Vec3::from(mass.acceleration).length() / mass.inv_mass);
-            let rest = weight * LAST_BITS * f64::from(Vec3::from(arm).length());
-            let entry = &mut entries[end as usize];
-            (entry.rest, entry.slack) = (entry.rest + rest, entry.slack + rest);
-        }
         let (of_joint, pair) = (Joint::<f64>::load(joint), pair_of(problem, joint));
         let mut energy = 0.0;
         if joint.is_loose == 0.0 {
@@ -43,7 +33,8 @@ pub(super) fn add_springs(entries: &mut [Entry], problem: &StepProblem, world: &
             let gap = gap_after(&problem.axes[k], motion_of(&pair, &frames, &axis).moved);
             energy += (axis_impulse(problem, k, &problem.joint_impulses) * gap).abs();
         }
-        entries[body as usize].springs += 0.5 * energy / substep(body as usize);
+        let (energy, entry) = (0.5 * energy / substep(body as usize), &mut entries[body as usize]);
+        (entry.springs, entry.slack) = (entry.springs + energy, entry.slack + energy);
     }
 }
 
@@ -76,7 +67,7 @@ pub(super) fn add_springs_at_start(
             let motion = motion_of(&pair, &frames_of(&pair, &of_joint), &axis);
             energy += 0.5 * (frequency * gap).powi(2) / axis_inverse_mass(&pair, &motion);
         }
-        entries[body as usize].kept += energy.min(0.5 * mass * f64::from(config.push_limit).powi(2));
+        entries[body as usize].work += energy.min(0.5 * mass * f64::from(config.push_limit).powi(2));
     }
 }
 
@@ -101,7 +92,8 @@ pub(super) fn add_work_of_drives(
     }
     if problem.params.driven != 0 {
         for contact in problem.swept_contacts() {
-            entries[moved_by(problem, contact)].work += work_of_surfaces(contact, problem);
+            let body = if can_move(problem, contact.body_a) { contact.body_a } else { contact.body_b };
+            entries[body as usize].work += work_of_surfaces(contact, problem);
         }
     }
     for &row in problem.rows_of(&problem.joint_colors()) {

@@ -33,7 +33,6 @@ pub(crate) use bodies::pose_after;
 pub use bodies::{begin, follow_parabolas, store};
 pub use contacts::{ContactRows, check_material};
 pub use damping::write_dampings;
-pub(crate) use effective::InverseMass;
 pub use joint_systems::{BlockRow, ImpulseNumber, JointSystems, NodeRow};
 pub use joints::JointRows;
 pub use rescale::StepScale;

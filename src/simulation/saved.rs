@@ -47,7 +47,7 @@ impl Snapshot {
 /// The first bytes of a saved run.
 const MAGIC: [u8; 8] = *b"drystone";
 /// The format version. It grows with every change of the format.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 /// Size of the header (bytes): the magic, the version, and the hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 
