@@ -190,14 +190,15 @@ fn jointed_scenes_stay_together_and_gain_no_energy() {
 
 #[test]
 fn boxes_stay_on_the_bridge_and_in_the_drum() {
-    for (name, parameters) in [("bridge", ["planks=10", "boxes=5"]), ("drum", ["n=20", "speed=2"])] {
+    // Joints that are solved at once stretch by a fraction of a millimeter under the boxes.
+    for (name, parameters, least) in [("bridge", ["planks=10", "boxes=5"], 5e-4), ("drum", ["n=20", "speed=2"], 0.1)] {
         let (scene, simulation) = run(name, &parameters, 240);
         assert_eq!(scene.escaped(&simulation.world), 0, "{name}");
         let both = scene.world.bodies.iter().zip(&simulation.world.bodies);
         let boxes = both.filter(|(was, _)| was.kind == BodyKind::Dynamic);
         let farthest = boxes.map(|(was, is)| was.position.distance(is.position)).fold(0.0, f32::max);
         println!("{name}: {farthest} m");
-        assert!(farthest > 1e-3, "{name}: nothing moved by more than {farthest} m in 4 s");
+        assert!(farthest > least, "{name}: nothing moved by more than {farthest} m in 4 s");
     }
 }
 
