@@ -2,7 +2,8 @@
 
 use crate::backend::cpu::Cpu;
 use crate::config::check_step_length;
-use crate::error::{Error, Result, input};
+use crate::error::Result;
+use crate::saved::{Format, Saved};
 use crate::simulation::{Simulation, Snapshot};
 use crate::world::World;
 
@@ -33,10 +34,7 @@ pub struct State {
     pub(super) time: f64,
 }
 
-/// The first bytes of a saved world of a batch.
-const MAGIC: [u8; 8] = *b"drybatch";
-/// Size of the header (bytes): the magic, the length of a step, steps and time, and the hash of the three.
-const HEADER: usize = 8 + 4 + 8 + 8 + 8;
+const WORLD_OF_BATCH: Format = Format { name: "a saved world of a batch", mark: *b"drybatch" };
 
 impl State {
     /// Number of steps since the start.
@@ -66,9 +64,13 @@ impl State {
 
     /// The state as bytes, the same on every machine.
     pub fn save(&self) -> Vec<u8> {
-        let numbers = [self.dt.to_le_bytes().as_slice(), &self.steps.to_le_bytes(), &self.time.to_le_bytes()].concat();
-        let hash = crate::saved::hash_of(&numbers).to_le_bytes();
-        [MAGIC.as_slice(), &numbers, &hash, &self.to_simulation().save()].concat()
+        let Self { mut dt, mut steps, mut time, .. } = self.clone();
+        WORLD_OF_BATCH.seal(|writer| {
+            dt.walk(writer)?;
+            steps.walk(writer)?;
+            time.walk(writer)?;
+            self.to_simulation().walk(writer)
+        })
     }
 
     /// Loads a saved state.
@@ -76,22 +78,13 @@ impl State {
     /// # Errors
     /// The bytes are not a saved world of a batch, have another version, or are damaged or cut short.
     pub fn load(bytes: &[u8]) -> Result<Self> {
-        let (header, simulation) = bytes.split_first_chunk::<HEADER>().ok_or_else(|| refused("cut short"))?;
-        let (magic, numbers, hash) = (&header[..8], &header[8..28], &header[28..]);
-        if magic != MAGIC {
-            return Err(refused("these bytes are not a saved world of a batch"));
-        }
-        if crate::saved::hash_of(numbers).to_le_bytes() != *hash {
-            return Err(refused("damaged: the hash of its time differs"));
-        }
-        let eight = |from: usize| numbers[from..from + 8].try_into().unwrap_or_default();
-        let dt = f32::from_le_bytes(numbers[..4].try_into().unwrap_or_default());
-        check_step_length(dt).map_err(|error| error.within("a saved world of a batch"))?;
-        let simulation = Simulation::load(simulation, Box::new(Cpu::new()))?.snapshot();
-        Ok(Self { simulation, dt, steps: u64::from_le_bytes(eight(4)), time: f64::from_le_bytes(eight(12)) })
+        WORLD_OF_BATCH.open(bytes, |reader| {
+            let (mut dt, mut steps, mut time) = (0.0, 0, 0.0);
+            dt.walk(reader)?;
+            check_step_length(dt)?;
+            steps.walk(reader)?;
+            time.walk(reader)?;
+            Ok(Self { simulation: Simulation::read(reader, Box::new(Cpu::new()))?.snapshot(), dt, steps, time })
+        })
     }
-}
-
-fn refused(why: &str) -> Error {
-    input!("a saved world of a batch cannot be loaded: {why}")
 }

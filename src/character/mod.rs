@@ -22,7 +22,8 @@ use glam::Vec3;
 
 use crate::config::check_step_length;
 use crate::error::{Result, ensure, input};
-use crate::queries::Hit;
+use crate::queries::{Hit, Predicate};
+use crate::saved::{Format, Saved};
 use crate::simulation::Simulation;
 use crate::world::{BodyHandle, BodyKind, MAX_SPEED, World};
 use surroundings::{Footing, Glide, Surroundings, Touch};
@@ -35,7 +36,8 @@ use surroundings::{Footing, Glide, Surroundings, Touch};
 ///
 /// The character goes out of the way of kinematic bodies and stays on the body on which it stands, however that body
 /// moves. It stops at other dynamic bodies and pushes them with a limited force. The same calls give the same bits for
-/// any number of threads. The value is the whole state: a copy of it belongs to a snapshot of the simulation.
+/// any number of threads. The value is the whole state: a copy of it belongs to a snapshot of the simulation, and its
+/// bytes ([`Character::save`]) to those of a saved run.
 ///
 /// ```
 /// use drystone::{Body, Character, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
@@ -122,6 +124,11 @@ pub struct Movement {
     pub contacts: Vec<Hit>,
 }
 
+const CHARACTER: Format = Format { name: "a saved character", mark: *b"drywalks" };
+
+crate::saved::fields!(Character { body, up, steepest, step_height, margin, mass, push_force, drift, ground });
+crate::saved::fields!(Ground { body, normal, velocity, surface_velocity });
+
 impl Character {
     /// A character that moves this kinematic body. It is in the air until its first step.
     pub fn new(body: BodyHandle) -> Self {
@@ -136,6 +143,39 @@ impl Character {
             drift: Vec3::ZERO,
             ground: None,
         }
+    }
+
+    /// The character as bytes, for [`Self::load`], beside [`Simulation::save`]. They are the same on every machine.
+    ///
+    /// ```
+    /// # use drystone::{Body, Character, Cpu, Shape, Simulation, World, glam::Vec3};
+    /// # let mut world = World::new();
+    /// # let mut character = Character::new(world.insert(Body::kinematic().shape(Shape::ball(0.5))));
+    /// # let mut simulation = Simulation::new(world)?;
+    /// character.launch(Vec3::Y * 5.0);
+    /// character.walk(&mut simulation, Vec3::X, 1.0 / 60.0)?;
+    /// simulation.step(1.0 / 60.0)?;
+    /// let (run, walker) = (simulation.save(), character.save());
+    /// let (mut again, mut other) = (Simulation::load(&run, Box::new(Cpu::new()))?, Character::load(&walker)?);
+    /// let movement = character.walk(&mut simulation, Vec3::X, 1.0 / 60.0)?;
+    /// assert_eq!(other.walk(&mut again, Vec3::X, 1.0 / 60.0)?, movement);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn save(&self) -> Vec<u8> {
+        let mut own = *self;
+        CHARACTER.seal(|writer| Saved::walk(&mut own, writer))
+    }
+
+    /// Loads a saved character.
+    ///
+    /// # Errors
+    /// The bytes are not a saved character, have another version, or are damaged or cut short.
+    pub fn load(bytes: &[u8]) -> Result<Self> {
+        CHARACTER.open(bytes, |reader| {
+            let mut character = Self::blank();
+            Saved::walk(&mut character, reader)?;
+            Ok(character)
+        })
     }
 
     /// The ground after the last call of [`Character::walk`].
@@ -175,11 +215,58 @@ impl Character {
     ///
     /// Each call looks at all bodies, like [`Simulation::queries`]. The character enters nothing at any speed.
     /// A kinematic body that moves by more than the smallest half extent of the character in one step can pass it.
+    /// [`ContactHooks`](crate::ContactHooks) do not act on it: see [`Self::walk_among`].
     ///
     /// # Errors
     /// The body is gone, not kinematic, or without convex shapes; a setting, the velocity or `dt` is out of range. The
     /// world is then unchanged.
     pub fn walk(&mut self, simulation: &mut Simulation, velocity: Vec3, dt: f32) -> Result<Movement> {
+        self.walk_by(simulation, velocity, dt, None)
+    }
+
+    /// The same as [`Self::walk`], but only bodies for which `only` returns true count, for example platforms that carry
+    /// from above and let pass from below.
+    ///
+    /// ```
+    /// use drystone::{Body, BodyHandle, Character, Shape, Simulation, World, glam::Vec3};
+    ///
+    /// // A platform 2 m above the feet of a character that jumps 3 m high.
+    /// let mut world = World::new();
+    /// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
+    /// let platform = world.insert(Body::fixed().shape(Shape::cuboid(2.0, 0.1, 2.0)).position(0.0, 1.9, 0.0));
+    /// let body = world.insert(Body::kinematic().shape(Shape::capsule(0.6, 0.3)).position(0.0, 0.906, 0.0));
+    /// let mut character = Character::new(body);
+    /// let mut simulation = Simulation::new(world)?;
+    /// character.launch(Vec3::Y * 7.67);
+    /// for _ in 0..120 {
+    ///     let feet = simulation.world.bodies[body].position.y - 0.9;
+    ///     let counts = |other: BodyHandle, _: &Body| other != platform || feet > 2.0;
+    ///     character.walk_among(&mut simulation, Vec3::ZERO, 1.0 / 60.0, &counts)?;
+    ///     simulation.step(1.0 / 60.0)?;
+    /// }
+    /// assert_eq!(character.ground().map(|ground| ground.body), Some(platform));
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As those of [`Self::walk`].
+    pub fn walk_among(
+        &mut self,
+        simulation: &mut Simulation,
+        velocity: Vec3,
+        dt: f32,
+        only: Predicate,
+    ) -> Result<Movement> {
+        self.walk_by(simulation, velocity, dt, Some(only))
+    }
+
+    fn walk_by(
+        &mut self,
+        simulation: &mut Simulation,
+        velocity: Vec3,
+        dt: f32,
+        only: Option<Predicate>,
+    ) -> Result<Movement> {
         check_step_length(dt)?;
         self.check(&simulation.world, velocity)?;
         let own = self.body.index();
@@ -190,7 +277,7 @@ impl Character {
         let (walked, pushes) = {
             let queries = simulation.queries();
             let around =
-                Surroundings::new(&simulation.world, &queries, self, self.ground.map(|ground| ground.body), dt);
+                Surroundings::new(&simulation.world, &queries, self, self.ground.map(|ground| ground.body), only, dt);
             let walked = self.way(&around, start, velocity, gravity, dt);
             let pushes = self.pushes(&around, &walked, gravity, dt);
             (walked, pushes)

@@ -8,7 +8,7 @@ use super::nearest::{HalfSpace, nearest};
 use super::{Character, Ground};
 use crate::collide::{Clearance, clearances};
 use crate::math::rotation::{about, product, unit};
-use crate::queries::{Filter, Hit, Queries};
+use crate::queries::{Filter, Hit, Predicate, Queries};
 use crate::world::{Body, BodyHandle, BodyKind, Collider, Shape, World, placed, pose};
 
 /// Distance at which the character touches, relative to its margin.
@@ -77,12 +77,13 @@ pub(super) struct Surroundings<'a> {
 }
 
 impl<'a> Surroundings<'a> {
-    /// `ground` is the body on which the character stands.
+    /// `ground` is the body on which the character stands. Only bodies count for which `only` returns true, if given.
     pub fn new(
         world: &'a World,
         queries: &'a Queries<'a>,
         character: &Character,
         ground: Option<BodyHandle>,
+        only: Option<Predicate<'a>>,
         dt: f32,
     ) -> Self {
         let (own, part) = (&world.bodies[character.body.index()], world.bodies.worlds()[character.body.index()]);
@@ -101,7 +102,7 @@ impl<'a> Surroundings<'a> {
             world,
             queries,
             own,
-            filter: Filter::default().groups(own.groups).world(part as usize).except(character.body),
+            filter: Filter { only, ..Filter::default().groups(own.groups).world(part as usize).except(character.body) },
             ground,
             without: None,
             dt,

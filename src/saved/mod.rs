@@ -6,10 +6,12 @@
 mod archive;
 mod code;
 mod columns;
+mod format;
 mod plain;
 
 pub(crate) use archive::{Archive, Reader, Writer};
 pub(crate) use columns::Columns;
+pub(crate) use format::Format;
 
 use crate::error::Result;
 

@@ -3,9 +3,8 @@
 use super::{Simulation, Stages, next_state};
 use crate::backend::Backend;
 use crate::config::SolverConfig;
-use crate::error::{Error, Result, ensure, input};
-use crate::panics;
-use crate::saved::{Archive, Reader, Saved, Writer, hash_of};
+use crate::error::{Result, ensure};
+use crate::saved::{Archive, Format, Reader, Saved, Writer};
 use crate::world::World;
 
 /// The state of a simulation between two steps, in memory: [`Simulation::snapshot`].
@@ -44,12 +43,7 @@ impl Snapshot {
     }
 }
 
-/// The first bytes of a saved run.
-const MAGIC: [u8; 8] = *b"drystone";
-/// The format version. It grows with every change of the format.
-const VERSION: u32 = 8;
-/// Size of the header (bytes): the magic, the version, and the hash of the content.
-const HEADER: usize = 8 + 4 + 8;
+const RUN: Format = Format { name: "a saved run", mark: *b"drystone" };
 
 impl Simulation {
     /// A second simulation that continues from this state on its own backend. Both reach the same bits if both get the
@@ -125,16 +119,7 @@ impl Simulation {
     /// [`Simulation::plan`] lack the parts that each step rewrites, and [`Simulation::manifolds`] gives the separations
     /// from the time when the manifolds were computed.
     pub fn save(&mut self) -> Vec<u8> {
-        let mut writer = Writer::default();
-        writer.bytes.extend_from_slice(&[0; HEADER]);
-        let written = self.walk(&mut writer);
-        debug_assert!(written.is_ok(), "{written:?}");
-        let mut bytes = writer.bytes;
-        let hash = hash_of(&bytes[HEADER..]);
-        bytes[..8].copy_from_slice(&MAGIC);
-        bytes[8..12].copy_from_slice(&VERSION.to_le_bytes());
-        bytes[12..HEADER].copy_from_slice(&hash.to_le_bytes());
-        bytes
+        RUN.seal(|writer| self.walk(writer))
     }
 
     /// Loads a saved simulation, with its own backend.
@@ -156,23 +141,15 @@ impl Simulation {
     /// # Ok::<(), drystone::Error>(())
     /// ```
     pub fn load(bytes: &[u8], backend: Box<dyn Backend>) -> Result<Self> {
-        let (header, content) = bytes.split_first_chunk::<HEADER>().ok_or_else(|| refused("cut short"))?;
-        ensure(header[..8] == MAGIC, || refused("these bytes are not a saved run").to_string())?;
-        let number =
-            |from: usize, to: usize| header[from..to].iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
-        let version = number(8, 12);
-        let other =
-            || refused(format_args!("it has version {version}, but this program reads version {VERSION}")).to_string();
-        ensure(version == u64::from(VERSION), other)?;
-        let damaged = || refused("it is damaged or cut short: the hash of its content differs").to_string();
-        ensure(number(12, HEADER) == hash_of(content), damaged)?;
+        RUN.open(bytes, |reader| Self::read(reader, backend))
+    }
+
+    /// Reads a simulation that [`Self::walk`] has written.
+    pub(crate) fn read(reader: &mut Reader, backend: Box<dyn Backend>) -> Result<Self> {
         let (world, config) = (World::blank(), SolverConfig::default());
         let stages = Stages::new(&world, &config);
         let mut simulation = Self::between_steps(world, config, stages, backend);
-        let mut reader = Reader::new(content);
-        let read = panics::caught(|| simulation.walk(&mut reader));
-        read.map_err(|panic| refused(format_args!("damaged: {}", panic.text)))?.map_err(refused)?;
-        ensure(reader.is_at_end(), || refused("it has bytes after its end").to_string())?;
+        simulation.walk(reader)?;
         Ok(simulation)
     }
 
@@ -184,7 +161,7 @@ impl Simulation {
         writer.bytes
     }
 
-    fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
+    pub(crate) fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         let Self { world, config, backend: _, stages, on_device: _, unfinished: _, state: _, is_pending: _, hooks: _ } =
             self;
         world.walk(archive)?;
@@ -196,8 +173,4 @@ impl Simulation {
         }
         stages.walk(world, archive)
     }
-}
-
-fn refused(why: impl std::fmt::Display) -> Error {
-    input!("a saved run cannot be loaded: {why}")
 }

@@ -596,6 +596,57 @@ fn a_copy_goes_on_to_the_same_bits() {
     assert_eq!(walk.position(), end);
 }
 
+/// Up and down stairs, in a jump and after it, with every step through bytes.
+#[test]
+fn a_character_that_goes_through_bytes_walks_on_to_the_same_bits() {
+    let mut walk = Walk::at(stairs(0.18, 12), MIDDLE * Vec3::Y);
+    let mut loaded = Walk::at(stairs(0.18, 12), MIDDLE * Vec3::Y);
+    for step in 0..90 {
+        for walk in [&mut walk, &mut loaded] {
+            if step == 40 {
+                walk.character.launch(3.0 * Vec3::Y);
+            }
+        }
+        let (bytes, character) = (loaded.simulation.save(), loaded.character.save());
+        loaded.simulation = Simulation::load(&bytes, Box::new(Reference::<f32>::new())).expect("a saved run");
+        loaded.character = Character::load(&character).expect("a saved character");
+        assert_eq!(loaded.step(2.0 * Vec3::X), walk.step(2.0 * Vec3::X), "step {step}");
+    }
+    let bytes = walk.character.save();
+    for at in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 1 << (at % 8);
+        for bytes in [&damaged[..], &bytes[..at]] {
+            let line = Character::load(bytes).expect_err("a refusal").to_string();
+            assert!(line.starts_with("a saved character cannot be loaded: ") && !line.contains('\n'), "{line}");
+        }
+    }
+    let line = Character::load(&walk.simulation.save()).expect_err("a refusal").to_string();
+    assert!(line.ends_with("these bytes are not a saved character"), "{line}");
+}
+
+/// A wall that does not count lets it through, a deck that does not count lets it fall, and another wall still stops it.
+#[test]
+fn only_bodies_that_count_stop_and_carry_a_character() {
+    let mut world = floor();
+    let ghost = world.insert(block(Vec3::new(0.2, 2.0, 2.0), Vec3::new(2.0, 2.0, 0.0)));
+    world.insert(block(Vec3::new(0.2, 2.0, 2.0), Vec3::new(4.0, 2.0, 0.0)));
+    let mut walk = Walk::at(world, MIDDLE * Vec3::Y);
+    for _ in 0..180 {
+        let counts = |other: BodyHandle, _: &Body| other != ghost;
+        walk.character.walk_among(&mut walk.simulation, 2.0 * Vec3::X, DT, &counts).expect("a walk");
+        walk.simulation.step(DT).expect("a step");
+    }
+    assert!((walk.position().x - (3.8 - RADIUS - MARGIN)).abs() < 1e-3, "{}", walk.position());
+    for _ in 0..60 {
+        walk.character.walk_among(&mut walk.simulation, Vec3::ZERO, DT, &|_, _| false).expect("a walk");
+        walk.simulation.step(DT).expect("a step");
+    }
+    // It leaves the ground in the first step, and falls for the others.
+    let fallen = 0.5 * 9.81 * (59.0 / 60.0_f32).powi(2);
+    assert!((walk.position().y - MIDDLE + fallen).abs() < 1e-3, "{}", walk.position());
+}
+
 #[test]
 fn a_character_of_any_size_walks_alike() {
     let path = |size: f32| {
