@@ -29,7 +29,8 @@ pub struct Listen {
     /// The approach speed above which steps report hits, 0 or more (m/s); `None` reports no hits. Bodies at rest
     /// approach at up to a few mm/s.
     pub hits_above: Option<f32>,
-    /// Whether steps sum impulses for [`Simulation::contacts_of`](crate::Simulation::contacts_of), without any event.
+    /// Whether steps sum impulses for [`Simulation::contacts_of`](crate::Simulation::contacts_of) and
+    /// [`Simulation::joint_force`](crate::Simulation::joint_force), without any event.
     pub impulses: bool,
 }
 

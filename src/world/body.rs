@@ -754,7 +754,7 @@ impl Body {
         self
     }
 
-    /// Sets friction, restitution, and how contacts combine them, for the shapes without own material.
+    /// Sets the [`Material`] of the shapes without their own.
     pub fn material(mut self, material: Material) -> Self {
         self.material = material;
         self

@@ -4,6 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Quat, Vec3};
 
+use super::World;
 use super::bodies::BodyHandle;
 use super::joint_axis::{Axis, Bounds, Drive};
 use crate::error::Result;
@@ -43,6 +44,7 @@ use crate::saved::{Archive, Saved};
 /// assert!(door.holds_anchors() && !door.is_ball() && door.collide);
 /// let piston = ball.slider(Vec3::Y).motor(0.5, 100.0);
 /// let barrier = ball.hinge(Vec3::Z).spring_damper(1.5, 40.0, 5.0);
+/// assert_eq!(ball.hinge(Vec3::Z).constant_load(-3.0).first_axis(), Some(&mut Axis::FREE.constant_load(-3.0)));
 /// let weld = ball.fixed();
 /// let [rope, rod, spring] = [ball.rope(2.0), ball.rod(2.0), ball.elastic(2.0, 1.5, 0.1)];
 /// assert_eq!(rope.linear, Linear::Distance(Axis::limited(0.0, 2.0)));
@@ -285,6 +287,40 @@ impl Joint {
         }
     }
 
+    /// Reads anchors and directions as given in the world so far, and moves them into the frames of the bodies where these
+    /// are now. All angles are zero there. A body that is not in `world` keeps its own; [`World::check`] refuses it.
+    ///
+    /// ```
+    /// use drystone::{Body, Joint, Shape, Simulation, World, glam::{Quat, Vec3}};
+    ///
+    /// // A lid that lies open, at an angle to its chest, and the hinge at their common edge.
+    /// let mut world = World::new();
+    /// let chest = world.insert(Body::fixed().shape(Shape::cuboid(0.5, 0.3, 0.4)).rotation(Quat::from_rotation_y(0.7)));
+    /// let turn = Quat::from_rotation_y(0.7) * Quat::from_rotation_x(-1.2);
+    /// let edge = Quat::from_rotation_y(0.7) * Vec3::new(0.0, 0.3, -0.4);
+    /// let at = edge + turn * Vec3::Z * 0.4;
+    /// let lid = Body::dynamic().shape(Shape::cuboid(0.5, 0.02, 0.4)).position(at.x, at.y, at.z).rotation(turn);
+    /// let lid = world.insert(lid);
+    /// let axis = Quat::from_rotation_y(0.7) * Vec3::X;
+    /// let hinge = world.insert_joint(Joint::new(lid, edge, chest, edge).hinge(axis).in_world(&world));
+    /// let mut simulation = Simulation::new(world)?;
+    /// simulation.step(1.0 / 60.0)?;
+    /// let hinge = simulation.world.joint(hinge).expect("it is there");
+    /// let [x, y, z, angle, ..] = simulation.world.joint_motion(hinge).position;
+    /// assert!(Vec3::new(x, y, z).length() < 1e-4 && angle.abs() < 0.01, "{angle} rad");
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub fn in_world(self, world: &World) -> Self {
+        let of = |body: Option<BodyHandle>, anchor: Vec3, frame: Quat| {
+            let Some(body) = body.and_then(|body| world.body(body)) else { return (anchor, frame) };
+            let back = body.rotation.inverse();
+            (back * (anchor - body.position), rotation::unit(rotation::product(back, frame)))
+        };
+        let (anchor_a, frame_a) = of(Some(self.body_a), self.anchor_a, self.frame_a);
+        let (anchor_b, frame_b) = of(self.body_b, self.anchor_b, self.frame_b);
+        Self { anchor_a, anchor_b, frame_a, frame_b, ..self }
+    }
+
     /// Limits the first axis that is not locked, or the distance: see [`Bounds::Between`]. On a ball joint this axis is
     /// the rotation about the first axis. [`World::check`](crate::World::check) refuses limits, a motor or a spring on
     /// a fixed joint.
@@ -297,6 +333,12 @@ impl Joint {
     /// push an axis beyond its limits.
     pub fn motor(mut self, speed: f32, max_load: f32) -> Self {
         self.on_first(|axis| axis.motor(speed, max_load));
+        self
+    }
+
+    /// Pushes the first axis that is not locked, or the distance, with a constant load: see [`Axis::constant_load`].
+    pub fn constant_load(mut self, load: f32) -> Self {
+        self.on_first(|axis| axis.constant_load(load));
         self
     }
 
@@ -436,8 +478,8 @@ impl Joint {
     /// simulation.step(0.1)?;
     /// assert!(simulation.world.bodies[lamp].position.y < -0.04);
     /// let at = simulation.world.bodies[lamp].position;
-    /// let joint = simulation.world.joints.index(hook).expect("it is there");
-    /// (simulation.world.joints[joint].enabled, simulation.world.joints[joint].anchor_b) = (true, at);
+    /// let joint = simulation.world.joint_mut(hook).expect("it is there");
+    /// (joint.enabled, joint.anchor_b) = (true, at);
     /// simulation.step(0.1)?;
     /// assert!(simulation.world.bodies[lamp].position.distance(at) < 1e-3);
     /// # Ok::<(), drystone::Error>(())

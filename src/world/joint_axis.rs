@@ -2,6 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
+use super::limits::MAX_SPEED;
 use crate::error::{Result, input};
 use crate::saved::{Archive, Saved};
 
@@ -128,6 +129,27 @@ impl Axis {
     /// dry friction. Limits of the axis hold against any load.
     pub const fn motor(self, speed: f32, max_load: f32) -> Self {
         Self { drive: Drive::Motor { speed, max_load }, ..self }
+    }
+
+    /// Pushes with a constant force or torque (N, N m), along the axis or, below zero, against it: a motor without a
+    /// speed of its own.
+    ///
+    /// ```
+    /// use drystone::{Axis, Body, Joint, Shape, Simulation, World, glam::Vec3, world::MAX_SPEED};
+    ///
+    /// // 10 N on 2 kg for a second: 5 m/s.
+    /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+    /// let cart = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.2, 0.3)).total_mass(2.0));
+    /// assert_eq!(Axis::FREE.constant_load(-10.0), Axis::FREE.motor(-MAX_SPEED, 10.0));
+    /// world.insert_joint(Joint::to_world(cart, Vec3::ZERO, Vec3::ZERO).slider(Vec3::X).constant_load(10.0));
+    /// let mut simulation = Simulation::new(world)?;
+    /// (0..60).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
+    /// assert!((simulation.world.bodies[cart].linear_velocity.x - 5.0).abs() < 1e-4);
+    /// # Ok::<(), drystone::Error>(())
+    /// ```
+    pub const fn constant_load(self, load: f32) -> Self {
+        let speed = if load < 0.0 { -MAX_SPEED } else { MAX_SPEED };
+        self.motor(speed, load.abs())
     }
 
     /// Adds a spring and damper that pull to `target` (m, rad) with up to `max_load` (N, N m). A spring turns an angle

@@ -216,8 +216,7 @@ fn boxes_on_a_slider_between_turned_frames_stay() {
         let turned = Quat::from_rotation_y(FRAC_PI_2 * quarter as f32);
         let a = world.insert(light().shape(cube(1.0)));
         let b = world.insert(light().shape(cube(1.0)).position(1.0, 0.0, 0.0).rotation(turned));
-        let slider = Joint::new(b, Vec3::ZERO, a, Vec3::ZERO).slider(Vec3::X);
-        world.insert_joint(slider.zero_at(turned, Quat::IDENTITY));
+        world.insert_joint(Joint::new(b, Vec3::X, a, Vec3::ZERO).slider(Vec3::X).in_world(&world));
         let mut simulation = started(world);
         run(&mut simulation, 60);
         for (handle, from) in [(a, Vec3::ZERO), (b, Vec3::X)] {
