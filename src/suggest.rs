@@ -37,7 +37,7 @@ pub fn hint<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>, more: imp
 }
 
 /// Largest number of names that a message lists in full.
-const FEW: usize = 9;
+const FEW: usize = 10;
 
 /// Shortens a message of serde about an unknown name. It replaces the long list of all known names by the nearest one
 /// and `all`, which says where the list is.

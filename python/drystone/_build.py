@@ -101,6 +101,17 @@ class Body:
         rows = _check.numbers("heights", heights, (-1, -1))
         return self.shape("height_field", heights=rows, scale=_check.vector("scale", scale), **keys)
 
+    def voxels(self, size: Vector, cells: ArrayLike, **keys: Any) -> Self:
+        """Add blocks in a grid. `size` has the sides of a cell along x, y, z (m). `cells` [C, 3] has the whole numbers of
+        the cells along the three axes; cell c begins at c * size.
+
+        >>> import drystone as ds
+        >>> ds.Body.fixed("stair").voxels((1, 0.5, 1), [[0, 0, 0], [1, 0, 0], [1, 1, 0]])
+        <Body 'stair', fixed: voxels>
+        """
+        numbers = _whole_rows("cells", cells)
+        return self.shape("voxels", size=_check.vector("size", size), cells=numbers, **keys)
+
     def at(self, x: float, y: float, z: float) -> Self:
         """Set the position (m)."""
         return self._set("position", _check.vector("position", (x, y, z)))
@@ -203,6 +214,16 @@ class Joint:
     def slider(self, axis: Vector) -> Self:
         """Make a slider along an axis (world)."""
         return self._set(type="slider", axis=_check.vector("axis", axis))
+
+    def cone(self, axis: Vector, angle: float) -> Self:
+        """Limit the angle between an axis (world) on one body and on the other (rad), and nothing else. A shoulder is a
+        ball joint and a cone with the same anchor.
+
+        >>> import drystone as ds
+        >>> ds.Joint("arm", "trunk").cone((1, 0, 0), 0.6).at(0, 1.4, 0).to_dict()["angle"]
+        0.6
+        """
+        return self._set(type="cone", axis=_check.vector("axis", axis), angle=_check.number("angle", angle))
 
     def fixed(self) -> Self:
         """Make a fixed joint: no axis is free."""
@@ -317,12 +338,19 @@ def _plain(value: Any) -> Any:
 
 def _indices(name: str, value: ArrayLike, count: int) -> list[list[int]]:
     """Rows of three indices below `count`."""
+    rows = _whole_rows(name, value)
+    low, high = min(map(min, rows), default=0), max(map(max, rows), default=0)
+    if rows and (low < 0 or high >= count):
+        raise ValueError(f"{name} has {low} to {high}: must be 0 to {count - 1}")
+    return rows
+
+
+def _whole_rows(name: str, value: ArrayLike) -> list[list[int]]:
+    """Rows of three whole numbers."""
     array = np.asarray(value)
     if array.dtype.kind not in "iu":
         raise ValueError(f"{name} has dtype {array.dtype}: must be whole numbers")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} has shape {array.shape}: must be (any, 3)")
-    if array.size and (array.min() < 0 or array.max() >= count):
-        raise ValueError(f"{name} has {array.min()} to {array.max()}: must be 0 to {count - 1}")
     rows: list[list[int]] = array.tolist()
     return rows

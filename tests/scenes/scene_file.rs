@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use drystone::{BodyKind, CombineRule, Error, Material};
+use drystone::{BodyKind, CombineRule, Error, Joint, Material};
 use drystone_scenes::{Scene, SceneFile, load, schema};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
@@ -57,6 +57,7 @@ fn every_shape() -> Vec<Value> {
         json!({"type": "cylinder", "half_height": 1, "radius": 0.5}),
         json!({"type": "cone", "half_height": 1, "radius": 0.5}),
         json!({"type": "convex_hull", "points": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}),
+        json!({"type": "voxels", "size": [1, 1, 1], "cells": [[0, 0, 0], [-1, 0, 0]]}),
         json!({"type": "half_space", "normal": [0, 1, 0]}),
         json!({"type": "mesh", "vertices": [[0, 0, 0], [0, 0, 1], [1, 0, 0]], "triangles": [[0, 1, 2]]}),
         json!({"type": "height_field", "heights": [[0, 0.1, 0], [0, 0.2, 0]], "scale": [4, 1, 2]}),
@@ -69,9 +70,9 @@ fn every_shape_loads_on_the_bodies_that_can_have_it() {
         assert_eq!(one_body(json!({"kind": "fixed", "shapes": [shape]})).mass.mass, 0.0);
         for kind in ["dynamic", "kinematic"] {
             let text = with_body(&json!({"kind": kind, "shapes": [shape]}));
-            // Six have volume; mesh and height field also move with a kinematic body.
+            // Seven have volume; mesh and height field also move with a kinematic body.
             let is_half_space = shape["type"] == "half_space";
-            if k < 6 || kind == "kinematic" && !is_half_space {
+            if k < 7 || kind == "kinematic" && !is_half_space {
                 let mass = read(&text).expect(kind).world.bodies[0].mass.mass;
                 assert_eq!(mass > 0.0, kind == "dynamic");
             } else {
@@ -396,6 +397,56 @@ fn what_is_neither_a_scene_nor_a_file_is_met_with_the_nearest_scene() {
     assert!(matches!(Scene::find("piles.json", &[]), Err(Error::File { .. })));
 }
 
+/// Blocks in a grid are a mesh on the ground, and boxes with a mass on a body that falls.
+#[test]
+fn voxels_of_a_file_are_boxes_on_a_dynamic_body() {
+    let stair = json!({"type": "voxels", "size": [1, 0.5, 2], "cells": [[0, 0, 0], [1, 0, 0], [1, 1, 0]], "position": [0, 3, 0],
+        "rotation": [0, 0.6, 0, 0.8], "material": {"friction": 0.1}});
+    let fixed = one_body(json!({"kind": "fixed", "shapes": [stair]}));
+    let cells = [[0, 0, 0], [1, 0, 0], [1, 1, 0]].map(glam::IVec3::from_array);
+    let size = Vec3::new(1.0, 0.5, 2.0);
+    let [mesh] = &fixed.colliders[..] else { panic!("{} shapes", fixed.colliders.len()) };
+    assert_eq!(mesh.shape.triangles(), drystone::Shape::voxels(size, &cells).expect("a stair").triangles());
+    let dynamic = one_body(json!({"kind": "dynamic", "shapes": [stair]}));
+    let boxes = drystone::Body::dynamic().voxels(size, &cells).expect("a stair").colliders;
+    assert!(boxes.len() == 2 && dynamic.colliders.len() == 2 && (dynamic.mass.mass - 3000.0).abs() < 1e-2);
+    for (part, own) in dynamic.colliders.iter().zip(boxes) {
+        let place = Vec3::Y * 3.0 + mesh.rotation * own.position;
+        assert!(part.position.distance(place) < 1e-6 && part.rotation == mesh.rotation, "{} m", part.position);
+        assert_eq!(part.material.map(|material| material.friction), Some(0.1));
+    }
+    let line = refused_shape(json!({"type": "voxels", "size": [1, 1, 1], "cells": []}));
+    assert!(line.contains("cell"), "{line}");
+    let line = refused_shape(json!({"type": "voxels", "size": [1, 0, 1], "cells": [[0, 0, 0]]}));
+    assert!(line.starts_with("voxels of [1, 0, 1] m: must be more than 0"), "{line}");
+}
+
+/// The cone of a file is that of the library, whatever the poses of the bodies.
+#[test]
+fn a_cone_of_a_file_holds_the_axis_of_the_world() {
+    let read = |angle: &str| {
+        let arm = r#"{"name": "arm", "position": [0, 0.5, 0], "rotation": [0, 0.6, 0, 0.8], "shapes": [{"type": "ball", "radius": 0.2}]}"#;
+        let cone = format!(
+            r#"{{"type": "cone", "bodies": ["arm"], "anchor": [0, 1, 0], "axis": [1, 0, 0], "angle": {angle}}}"#
+        );
+        let text = format!(r#"{{"version": 1, "bodies": [{arm}], "joints": [{cone}]}}"#);
+        SceneFile::parse(&text).and_then(|file| file.into_scene("a"))
+    };
+    let scene = read("0.5").expect("a scene");
+    let anchor = Vec3::Y;
+    let cone = Joint::to_world(0, anchor, anchor).along(Vec3::X).in_world(&scene.world).cone(0.5);
+    let joint = scene.world.joints[0];
+    assert!(
+        joint.anchor_a.distance(cone.anchor_a) < 1e-6 && joint.anchor_b.distance(cone.anchor_b) < 1e-6,
+        "{joint:?}"
+    );
+    assert_eq!(joint.linear, cone.linear);
+    for angle in ["0", "3.2", "-1"] {
+        let line = read(angle).map(|_| ()).expect_err("a refusal").to_string();
+        assert!(line.starts_with("joints[0]: angle = ") && line.ends_with("more than 0 and less than pi"), "{line}");
+    }
+}
+
 /// Damping, locked axes and sleep of a body, there and back, and one line for each that is amiss.
 #[test]
 fn damping_and_locks_of_a_body_are_keys() {
@@ -512,7 +563,7 @@ fn the_schema_describes_every_key() {
     assert_eq!((&joint["required"], &joint["unevaluatedProperties"]), (&json!(["bodies"]), &json!(false)));
     let kinds = joint["oneOf"].as_array().expect("kinds").iter();
     let kinds: Vec<_> = kinds.map(|kind| kind["properties"]["type"]["const"].clone()).collect();
-    assert_eq!(kinds, ["ball", "fixed", "hinge", "slider", "distance", "generic"]);
+    assert_eq!(kinds, ["ball", "fixed", "hinge", "slider", "distance", "cone", "generic"]);
     let types: Vec<_> = every_shape().iter().map(|s| s["type"].clone()).collect();
     let described: Vec<_> = schema["$defs"]["ShapeFile"]["oneOf"].as_array().expect("shapes").iter().collect();
     assert_eq!(described.iter().map(|s| s["properties"]["type"]["const"].clone()).collect::<Vec<_>>(), types);

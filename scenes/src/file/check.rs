@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 
 use super::joint::joint;
 use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
@@ -103,7 +103,8 @@ fn body(file: &BodyFile) -> Result<Body> {
         .velocity(linear.into(), angular.into())
         .material(own);
     for (k, shape_file) in file.shapes.iter().enumerate() {
-        body = body.collider(collider(shape_file).map_err(|e| e.within(format_args!("shapes[{k}]")))?);
+        let colliders = colliders(shape_file, file.kind).map_err(|e| e.within(format_args!("shapes[{k}]")))?;
+        body = colliders.into_iter().fold(body, Body::collider);
     }
     let body = with_mass(body, file)?;
     body.check().map(|()| body)
@@ -191,11 +192,22 @@ fn material(file: &MaterialFile) -> Result<Material> {
     })
 }
 
-/// A shape on a body. It is checked before the body computes a mass from it.
-fn collider(file: &ShapeFile) -> Result<Collider> {
+/// A shape on a body: one collider, or one for each box of voxels on a dynamic body. They are checked before the body
+/// computes a mass from them.
+fn colliders(file: &ShapeFile, kind: BodyKind) -> Result<Vec<Collider>> {
     let extent = |name: &str, x: f64| finite(name, [x]).map(|[x]| x);
     let round = |of: fn(f32, f32) -> Shape, half_height: f64, radius: f64| -> Result<Shape> {
         Ok(of(extent("half_height", half_height)?, extent("radius", radius)?))
+    };
+    let own = |shape: Shape| -> Result<Collider> {
+        shape.check()?;
+        Ok(Collider {
+            position: lengths("position", file.position)?.into(),
+            rotation: rotation("rotation", file.rotation)?,
+            sensor: file.sensor,
+            material: file.material.as_ref().map(material).transpose().map_err(|e| e.within("material"))?,
+            ..Collider::new(shape)
+        })
     };
     let shape = match &file.geometry {
         Geometry::Ball { radius } => Shape::ball(extent("radius", *radius)?),
@@ -211,6 +223,20 @@ fn collider(file: &ShapeFile) -> Result<Collider> {
         Geometry::Mesh { vertices: corners, triangles } => {
             Shape::mesh(vertices("vertices", corners)?, triangles.clone())?
         }
+        Geometry::Voxels { size, cells } => {
+            let (size, cells) =
+                (finite("size", *size)?.into(), cells.iter().copied().map(IVec3::from).collect::<Vec<_>>());
+            if kind == BodyKind::Dynamic {
+                let boxes = Body::dynamic().voxels(size, &cells)?.colliders.into_iter();
+                return boxes
+                    .map(|part| {
+                        let whole = own(part.shape)?;
+                        Ok(Collider { position: whole.position + whole.rotation * part.position, ..whole })
+                    })
+                    .collect();
+            }
+            Shape::voxels(size, &cells)?
+        }
         Geometry::HeightField { heights, scale } => {
             let height = |(k, row): (usize, &Vec<f64>)| {
                 row.iter().map(|&h| extent(&format!("heights[{k}]"), h)).collect::<Result<Vec<f32>>>()
@@ -219,14 +245,7 @@ fn collider(file: &ShapeFile) -> Result<Collider> {
             Shape::height_field(&heights, finite("scale", *scale)?.into())?
         }
     };
-    shape.check()?;
-    Ok(Collider {
-        position: lengths("position", file.position)?.into(),
-        rotation: rotation("rotation", file.rotation)?,
-        sensor: file.sensor,
-        material: file.material.as_ref().map(material).transpose().map_err(|e| e.within("material"))?,
-        ..Collider::new(shape)
-    })
+    Ok(vec![own(shape)?])
 }
 
 fn vertices(name: &str, points: &[[f64; 3]]) -> Result<Vec<Vec3>> {

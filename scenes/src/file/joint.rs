@@ -1,10 +1,11 @@
 //! Converts a joint of a scene file to a joint of the world.
 
+use std::f32::consts::PI;
 use std::fmt;
 
 use glam::{Quat, Vec3};
 
-use super::numbers::{finite, lengths, positive, rotation, unit};
+use super::numbers::{checked, finite, lengths, positive, rotation, unit};
 use super::schema::{AxisFile, BodyRef, JointFile, JointKind, MotorFile, SpringFile};
 use drystone::stages::error::{ensure, input};
 use drystone::stages::math::rotation as turn;
@@ -96,6 +97,11 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
         }
         JointKind::Distance { limits, motor, spring } => {
             joint.at_distance(read_axis("", false, limits, motor, spring)?)
+        }
+        JointKind::Cone { axis, angle } => {
+            let in_range = |angle: f32| angle > 0.0 && angle < PI;
+            let [angle] = checked("angle", [*angle], "more than 0 and less than pi", in_range)?;
+            along(axis)?.cone(angle)
         }
         JointKind::Generic { frame, frames, linear, angular } => {
             let [linear, angular] = [("linear", linear), ("angular", angular)].map(|(name, axes)| {

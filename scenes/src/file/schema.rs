@@ -385,6 +385,13 @@ pub enum Geometry {
         /// The points.
         points: Vec<[f64; 3]>,
     },
+    /// Blocks in a grid: a mesh on a body that is not dynamic, and as few boxes as possible on a dynamic one.
+    Voxels {
+        /// Sides of a cell along x, y, z.
+        size: [f64; 3],
+        /// Numbers of the cells along x, y, z. Cell c begins at c times `size`.
+        cells: Vec<[i32; 3]>,
+    },
     /// All points p with p · normal <= 0; on fixed bodies only.
     HalfSpace {
         /// The outward normal, of length 1 within 0.001.
@@ -493,6 +500,14 @@ pub enum JointKind {
         /// A spring (m, N).
         #[serde(skip_serializing_if = "Option::is_none")]
         spring: Option<SpringFile>,
+    },
+    /// The angle between the axis on the first body and on the second is limited, in all directions alike. Nothing else
+    /// is: a shoulder is a ball joint and a cone with the same anchor.
+    Cone {
+        /// Direction of the axis in the world, at the initial poses of the bodies; of length 1 within 0.001.
+        axis: [f64; 3],
+        /// Largest angle (rad), more than 0 and less than pi.
+        angle: f64,
     },
     /// Each axis has its own settings.
     Generic {
