@@ -21,6 +21,7 @@ pub fn all() -> Vec<Golden> {
         Golden::of_catalogue("arch", "arch:voussoirs=11", 60),
         Golden::of_catalogue("card-house", "card-house:storeys=2", 60),
         Golden::of_catalogue("drum", "drum:n=30", 120),
+        Golden::of_catalogue("belts", "belts", 120),
     ]
 }
 
