@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use bevy_app::FixedMain;
 use bevy_app::prelude::*;
-use bevy_drystone::drystone::{Cpu, Material, Simulation, SolverConfig, World as Bodies};
+use bevy_drystone::drystone::{
+    BodyHandle, Character, ColliderOf, ContactHooks, Cpu, Material, Simulation, SolverConfig, World as Bodies,
+};
 use bevy_drystone::prelude::*;
 use bevy_drystone::{Order, PhysicsSnapshot};
 use bevy_ecs::prelude::*;
@@ -704,4 +706,56 @@ fn physics_of_the_program_and_bodies_before_the_plugin_are_taken_over() {
     assert!((place(&app, entity).y - 0.05).abs() < 1e-3, "{}", place(&app, entity));
     let physics = app.world().resource::<Physics>();
     assert!(physics.simulation.config().substeps == 2 && physics.joint_handle(rope).is_some());
+}
+
+#[derive(Component)]
+struct Walker(Character);
+
+fn walk(mut physics: ResMut<Physics>, mut walkers: Query<&mut Walker>) -> Result {
+    for mut walker in &mut walkers {
+        walker.0.walk(&mut physics.simulation, 2.0 * Vec3::X, 1.0 / 64.0)?;
+    }
+    Ok(())
+}
+
+/// A character walks for a second, up a step of 20 cm.
+#[test]
+fn a_character_walks_before_each_step() {
+    let mut app = app();
+    app.add_systems(FixedUpdate, walk);
+    spawn(&mut app, floor());
+    let step_up = Collider::from(Shape::cuboid(2.0, 0.1, 2.0));
+    spawn(&mut app, (RigidBody::Static, step_up, Transform::from_xyz(3.2, 0.1, 0.0)));
+    let capsule =
+        (RigidBody::Kinematic, Collider::from(Shape::capsule(0.6, 0.3)), Transform::from_xyz(0.0, 0.906, 0.0));
+    let walker = spawn(&mut app, capsule);
+    step(&mut app, 1);
+    let character = Character::new(app.world().resource::<Physics>().handle(walker).expect("a body"));
+    app.world_mut().entity_mut(walker).insert(Walker(character));
+    step(&mut app, 64);
+    assert!(place(&app, walker).distance(Vec3::new(2.0, 1.106, 0.0)) < 0.01, "{}", place(&app, walker));
+    assert!(told(&mut app).is_empty());
+}
+
+/// Lets the body of one entity pass.
+struct Ghost(BodyHandle);
+
+impl ContactHooks for Ghost {
+    fn may_touch(&mut self, _: &Bodies, a: ColliderOf, b: ColliderOf) -> bool {
+        a.body != self.0 && b.body != self.0
+    }
+}
+
+#[test]
+fn a_hook_lets_the_body_of_an_entity_fall_through_the_floor() {
+    let mut app = app();
+    spawn(&mut app, floor());
+    let [ghost, other] = [0.0, 3.0].map(|x| spawn(&mut app, ball(x, 0.5)));
+    step(&mut app, 1);
+    let mut physics = app.world_mut().resource_mut::<Physics>();
+    let handle = physics.handle(ghost).expect("a body");
+    assert_eq!(physics.entity(handle), Some(ghost));
+    physics.simulation.set_hooks(Some(Box::new(Ghost(handle))));
+    step(&mut app, 64);
+    assert!(place(&app, ghost).y < -4.0 && (place(&app, other).y - 0.5).abs() < 1e-3);
 }
