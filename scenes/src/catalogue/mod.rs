@@ -298,7 +298,7 @@ pub static CATALOGUE: &[Entry] = &[
     },
     Entry {
         name: "course",
-        summary: "stairs, a ramp, a turntable, crates and a steep slope: a character walks from end to end",
+        summary: "stairs, a ramp, a turntable, crates and a steep slope: a character walks from end to end if keys steer it",
         parameters: &[Parameter::real("spin", 0.5, (-3.0, 3.0), "angular speed of the turntable [rad/s]")],
         bodies: |_| 3.0,
         build: |v| Ok(course::course(v[0] as f32)),
