@@ -210,6 +210,41 @@ fn every_domino_falls() {
     assert!(upright.is_empty(), "{upright:?}");
 }
 
+/// Falls at g/d with damping d and at the largest speed; then an arm on its cone, a flag at sin(angle) = load, and a lamp
+/// that has sunk by m g/k. A crate with locked axes comes down the stairs and keeps its plane and its rotation to the bit.
+#[test]
+fn every_body_of_held_obeys_its_formula() {
+    for [damping, cone, load] in [[3.0, 30.0, 0.5], [6.0, 60.0, 0.8]] {
+        let parameters = [format!("damping={damping}"), format!("cone={cone}"), format!("load={load}")];
+        let scene = Scene::find("held", &parameters).expect("held");
+        let mut simulation =
+            Simulation::with(scene.world, SolverConfig::default().without_sleep(), Box::new(Reference::<f32>::new()))
+                .expect("a world");
+        step(&mut simulation, 90);
+        let named = |simulation: &Simulation, name: &str| {
+            let found = simulation.world.bodies.iter().find(|body| body.name == name);
+            found.expect("the body").clone()
+        };
+        let [damped, slow] = ["damped", "slow"].map(|name| -named(&simulation, name).linear_velocity.y);
+        let expected = 9.81 / damping * (1.0 - (-damping * 1.5_f32).exp());
+        assert!(
+            (damped - expected).abs() < 1e-3 && (slow - 2.0).abs() < 1e-5,
+            "{damped}, not {expected} m/s; {slow} m/s"
+        );
+        step(&mut simulation, 810);
+        let leans = |name: &str| (named(&simulation, name).rotation * Vec3::Y).angle_between(Vec3::Y).to_degrees();
+        let (arm, flag) = (leans("arm"), leans("flag"));
+        // Pushed with three times its weight, it would lean by 72 degrees.
+        assert!((arm - cone).abs() < 0.3, "the arm leans by {arm} degrees");
+        assert!((flag - load.asin().to_degrees()).abs() < 0.3, "the flag leans by {flag} degrees");
+        let lamp = named(&simulation, "lamp").position.y;
+        assert!((2.5 - lamp - 4.0 * 9.81 / 200.0).abs() < 1e-3, "the lamp hangs at {lamp} m");
+        let sled = named(&simulation, "crate");
+        assert!(sled.position.x > 6.0 && sled.position.y < 0.16, "{} m", sled.position);
+        assert_eq!((sled.position.z, sled.rotation), (0.0, glam::Quat::IDENTITY));
+    }
+}
+
 /// A scene with spawners, stepped as the program does; `tell` is called after each step with what came and left so far.
 fn flow(name: &str, parameters: &[&str], steps: u32, tell: impl FnMut(u32, &Simulation, &Spawners)) {
     flow_on(Box::new(Reference::<f32>::new()), name, parameters, steps, tell);

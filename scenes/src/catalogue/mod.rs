@@ -10,6 +10,7 @@ mod entry;
 mod families;
 mod fast;
 mod flow;
+mod held;
 mod jointed;
 mod machines;
 mod masonry;
@@ -412,6 +413,17 @@ pub static CATALOGUE: &[Entry] = &[
         ],
         bodies: |v| v[0],
         build: |v| Ok(flow::belts(v[0] as usize, v[1] as f32)),
+    },
+    Entry {
+        name: "held",
+        summary: "damping, a largest speed, a cone, a load on a hinge, a spring, locked axes: each as its formula says",
+        parameters: &[
+            Parameter::real("damping", 3.0, (0.0, 100.0), "damping of the ball on the left [1/s]"),
+            Parameter::real("cone", 30.0, (1.0, 170.0), "angle of the cone of the arm [degrees]"),
+            Parameter::real("load", 0.5, (0.0, 0.99), "torque on the flag, relative to the torque that holds it level"),
+        ],
+        bodies: |_| 6.0,
+        build: |v| held::held(v[0] as f32, v[1] as f32, v[2] as f32),
     },
     Entry {
         name: "turnstile",
