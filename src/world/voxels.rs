@@ -1,7 +1,5 @@
 //! Blocks in a grid: the mesh of their surface, and boxes that fill them.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use glam::{IVec3, Vec3};
 
 use super::limits::{MAX_LENGTH, is_place};
@@ -14,7 +12,8 @@ type Cell = [i64; 3];
 pub(super) struct Voxels {
     /// Sides of a cell (m). The cell `c` begins at `c * size`.
     size: Vec3,
-    solid: BTreeSet<Cell>,
+    /// Sorted, each once.
+    solid: Vec<Cell>,
 }
 
 impl Voxels {
@@ -23,18 +22,18 @@ impl Voxels {
         ensure(is_place(size) && size.min_element() > 0.0, || {
             format!("voxels of {size} m: must be more than 0 and at most {MAX_LENGTH:e} m")
         })?;
-        Ok(Self { size, solid: cells.iter().map(|cell| cell.to_array().map(i64::from)).collect() })
+        Ok(Self { size, solid: sorted(cells.iter().map(|cell| cell.to_array().map(i64::from)).collect()) })
     }
 
     /// Vertices and triangles of the surface. Neighbors share the corners of their faces, so no body catches on the
     /// edges between them.
     pub fn surface(&self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        let (mut numbers, mut vertices, mut triangles) = (BTreeMap::new(), Vec::new(), Vec::new());
+        let mut faces = Vec::new();
         for &cell in &self.solid {
             for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
                 let mut beside = cell;
                 beside[axis] += 2 * side - 1;
-                if self.solid.contains(&beside) {
+                if self.solid.binary_search(&beside).is_ok() {
                     continue;
                 }
                 let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[along, across]| {
@@ -42,39 +41,44 @@ impl Voxels {
                     corner[axis] += side;
                     corner[(axis + 1) % 3] += along;
                     corner[(axis + 2) % 3] += across;
-                    *numbers.entry(corner).or_insert_with(|| {
-                        vertices.push(self.place(corner));
-                        vertices.len() as u32 - 1
-                    })
+                    corner
                 });
-                // Counter-clockwise seen from outside.
-                let [a, b, c, d] = corners;
-                triangles.extend(if side == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+                faces.push((side, corners));
             }
         }
-        (vertices, triangles)
+        let corners = sorted(faces.iter().flat_map(|(_, corners)| *corners).collect());
+        let number = |corner: Cell| corners.partition_point(|other| *other < corner) as u32;
+        let triangles = faces.iter().flat_map(|(side, corners)| {
+            // Counter-clockwise seen from outside.
+            let [a, b, c, d] = corners.map(number);
+            if *side == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] }
+        });
+        (corners.iter().map(|&corner| self.place(corner)).collect(), triangles.collect())
     }
 
     /// Half extents and centers of boxes that fill each cell once (m). Each box begins at the first cell that is left,
     /// and grows along Z, Y and X as far as cells are left.
     pub fn boxes(&self) -> Vec<(Vec3, Vec3)> {
-        let mut left = self.solid.clone();
+        let mut is_left = vec![true; self.solid.len()];
         let mut boxes = Vec::new();
-        while let Some(&begin) = left.first() {
+        for first in 0..self.solid.len() {
+            if !is_left[first] {
+                continue;
+            }
+            let begin = self.solid[first];
             let mut end = begin.map(|x| x + 1);
             for axis in [2, 1, 0] {
-                let is_left = |end: Cell| {
+                let grows = |end: Cell| {
                     let mut layer = (begin, end);
                     (layer.0[axis], layer.1[axis]) = (end[axis], end[axis] + 1);
-                    cells_of(layer).all(|cell| left.contains(&cell))
+                    cells_of(layer).all(|cell| self.solid.binary_search(&cell).is_ok_and(|k| is_left[k]))
                 };
-                while is_left(end) {
+                while grows(end) {
                     end[axis] += 1;
                 }
             }
-            for cell in cells_of((begin, end)) {
-                left.remove(&cell);
-            }
+            let filled = cells_of((begin, end)).filter_map(|cell| self.solid.binary_search(&cell).ok());
+            filled.for_each(|k| is_left[k] = false);
             let (least, most) = (self.place(begin), self.place(end));
             boxes.push((0.5 * (most - least), 0.5 * (most + least)));
         }
@@ -84,6 +88,13 @@ impl Voxels {
     fn place(&self, corner: Cell) -> Vec3 {
         Vec3::from_array(corner.map(|x| x as f32)) * self.size
     }
+}
+
+/// The cells in ascending order, each once.
+fn sorted(mut cells: Vec<Cell>) -> Vec<Cell> {
+    cells.sort_unstable();
+    cells.dedup();
+    cells
 }
 
 /// The cells from `begin` up to `end`, without `end`.

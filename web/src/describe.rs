@@ -17,7 +17,8 @@ pub fn catalogue() -> Value {
 
 /// The presets with the settings that they change, and every setting with its description, its words and its default.
 pub fn settings() -> Value {
-    let schema = schemars::schema_for!(SolverConfig).to_value();
+    // Written by `drystone settings --schema`.
+    let schema: Value = serde_json::from_str(include_str!("settings.json")).unwrap_or_default();
     let defaults = values(&SolverConfig::default());
     let preset = |p: &Preset| {
         let changed: Map<String, Value> =

@@ -45,12 +45,18 @@ pub struct SettingsArgs {
     /// Print the values of this preset.
     #[arg(long, value_parser = words::of::<Preset>(), default_value_t)]
     preset: Preset,
+    /// Print the JSON Schema of settings instead.
+    #[arg(long)]
+    schema: bool,
 }
 
 impl SettingsArgs {
     pub fn run(&self) -> Result<()> {
-        let config = toml::Table::try_from(self.preset.config()).expect("a config is a table");
         let schema = schemars::schema_for!(SolverConfig).to_value();
+        if self.schema {
+            return print(serde_json::to_string_pretty(&schema).expect("a schema serializes"));
+        }
+        let config = toml::Table::try_from(self.preset.config()).expect("a config is a table");
         print_settings(&config, &schema, &schema)
     }
 }

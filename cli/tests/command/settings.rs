@@ -4,6 +4,16 @@ use drystone::SolverConfig;
 use drystone::config::FrictionRule;
 use drystone_cli::settings::{read, set, unusual};
 
+/// The page has the schema as a file, so that its module need not carry what makes it.
+#[test]
+fn the_page_has_the_schema_of_the_settings() {
+    let program = env!("CARGO_BIN_EXE_drystone");
+    let output = std::process::Command::new(program).args(["settings", "--schema"]).output().expect("the program");
+    let printed = String::from_utf8(output.stdout).expect("text");
+    let file = include_str!("../../../web/src/settings.json");
+    assert!(printed == file, "drystone settings --schema > web/src/settings.json");
+}
+
 #[test]
 fn settings_out_of_their_range_are_refused_by_name() {
     for (name, good, bad) in [
