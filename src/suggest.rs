@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn a_long_list_becomes_the_nearest_name_and_where_the_list_is() {
-        let message = "unknown field `substep`, expected one of `substeps`, `b`, `c`, `d`, `e`, `f`, `g`, `h`, `i`, `j` at line 1 column 5";
+        let message = "unknown field `substep`, expected one of `substeps`, `b`, `c`, `d`, `e`, `f`, `g`, `h`, `i`, `j`, `k` at line 1 column 5";
         assert_eq!(
             shorten(message, "`drystone settings` lists all"),
             "unknown field `substep` at line 1 column 5; did you mean \"substeps\"? `drystone settings` lists all"
