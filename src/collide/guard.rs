@@ -131,16 +131,16 @@ impl Detector {
             }
         }
         let roots = islands.roots();
-        let mut first: BTreeMap<u32, f32> = BTreeMap::new();
+        let mut first: Vec<Option<f32>> = vec![None; world.bodies.len()];
         for (i, end) in &ends {
-            let share = first.entry(roots[*i as usize]).or_insert(1.0);
-            *share = share.min(end.share);
+            let share = &mut first[roots[*i as usize] as usize];
+            *share = Some(share.map_or(end.share, |share| share.min(end.share)));
         }
         let own: BTreeMap<u32, End> = ends.iter().copied().collect();
         ends.retain(|&(i, _)| !is_tied(i));
         let held = (0..).zip(roots).filter(|&(i, _)| is_tied(i) && is_dynamic(i as usize));
         ends.extend(held.filter_map(|(i, root)| {
-            let share = *first.get(root)?;
+            let share = first[*root as usize]?;
             let end = || End { at: self.way_of(world, i, dt).at(share), share, against: Vec3::ZERO, pace: Vec3::ZERO };
             Some((i, own.get(&i).filter(|end| end.share == share).copied().unwrap_or_else(end)))
         }));

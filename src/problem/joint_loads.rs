@@ -4,48 +4,57 @@ use std::collections::BTreeMap;
 
 use glam::Vec4;
 
+/// A body on joints.
+struct Node {
+    joints: Vec<usize>,
+    /// Number of joints on the way from the support, 0 until that is known.
+    distance: u32,
+    /// Its own load, and that of the bodies that it has passed on.
+    load: Vec4,
+}
+
 /// The load of each joint: the sum of mass times position (kg m), and the mass (kg). Every body passes its own mass and
 /// the load that hangs on it to the joints that lead toward a support, in equal parts. `sides` are the movable bodies
 /// of each joint. A joint with one side is a support. If there is none, the heaviest body takes its place.
 pub fn borne(sides: &[[Option<u32>; 2]], own: impl Fn(u32) -> Vec4) -> Vec<Vec4> {
-    let mut of_body: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (joint, own) in sides.iter().enumerate() {
-        own.iter().flatten().for_each(|&body| of_body.entry(body).or_default().push(joint));
+    let mut nodes: BTreeMap<u32, Node> = BTreeMap::new();
+    for (joint, both) in sides.iter().enumerate() {
+        for &body in both.iter().flatten() {
+            let node = nodes.entry(body);
+            node.or_insert_with(|| Node { joints: Vec::new(), distance: 0, load: own(body) }).joints.push(joint);
+        }
     }
     let is_support = |joint: usize| sides[joint].iter().flatten().count() == 1;
     let mut layer: Vec<u32> =
-        of_body.iter().filter(|(_, own)| own.iter().any(|&j| is_support(j))).map(|(&body, _)| body).collect();
+        nodes.iter().filter(|(_, node)| node.joints.iter().any(|&j| is_support(j))).map(|(&body, _)| body).collect();
     if layer.is_empty() {
-        layer.extend(of_body.keys().copied().max_by(|&a, &b| own(a).w.total_cmp(&own(b).w)));
+        layer.extend(nodes.iter().max_by(|a, b| a.1.load.w.total_cmp(&b.1.load.w)).map(|(&body, _)| body));
     }
-    let mut distances: BTreeMap<u32, u32> = layer.iter().map(|&body| (body, 1)).collect();
     let mut order = Vec::new();
-    for distance in 2.. {
+    for distance in 1.. {
+        layer.retain(|body| {
+            let node = nodes.get_mut(body).expect("every body has a node");
+            let is_new = node.distance == 0;
+            node.distance = if is_new { distance } else { node.distance };
+            is_new
+        });
         if layer.is_empty() {
             break;
         }
         order.extend_from_slice(&layer);
-        let around = std::mem::take(&mut layer).into_iter().flat_map(|body| of_body[&body].clone());
-        for body in around.flat_map(|joint| sides[joint]).flatten() {
-            if let std::collections::btree_map::Entry::Vacant(entry) = distances.entry(body) {
-                entry.insert(distance);
-                layer.push(body);
-            }
-        }
+        layer = layer.iter().flat_map(|body| &nodes[body].joints).flat_map(|&joint| sides[joint]).flatten().collect();
     }
     let mut borne = vec![Vec4::ZERO; sides.len()];
-    let mut load: BTreeMap<u32, Vec4> = of_body.keys().map(|&body| (body, own(body))).collect();
     for body in order.into_iter().rev() {
-        let distance = distances[&body];
-        let above = |&joint: &usize| {
-            sides[joint].iter().flatten().find(|&&other| other != body).map_or(0, |other| distances[other]) < distance
-        };
-        let up: Vec<usize> = of_body[&body].iter().copied().filter(above).collect();
-        let share = load[&body] / up.len().max(1) as f32;
+        let Node { joints, distance, load } = &nodes[&body];
+        let other = |joint: usize| sides[joint].iter().flatten().copied().find(|&other| other != body);
+        let above = |&joint: &usize| other(joint).map_or(0, |other| nodes[&other].distance) < *distance;
+        let up: Vec<usize> = joints.iter().copied().filter(above).collect();
+        let share = *load / up.len().max(1) as f32;
         for joint in up {
             borne[joint] = share;
-            if let Some(other) = sides[joint].iter().flatten().find(|&&other| other != body) {
-                *load.get_mut(other).expect("every body has a load") += share;
+            if let Some(node) = other(joint).and_then(|other| nodes.get_mut(&other)) {
+                node.load += share;
             }
         }
     }
