@@ -441,6 +441,11 @@ fn a_cone_of_a_file_holds_the_axis_of_the_world() {
         "{joint:?}"
     );
     assert_eq!(joint.linear, cone.linear);
+    // The anchor in the frame of the arm, and the end of an axis as long as its lever.
+    let back = Quat::from_xyzw(0.0, -0.6, 0.0, 0.8);
+    let lever = back * (anchor - Vec3::Y * 0.5);
+    let end = lever + back * Vec3::X * lever.length();
+    assert!(joint.anchor_a.distance(end) < 1e-6 && joint.anchor_b.distance(anchor + Vec3::X * 0.5) < 1e-6, "{joint:?}");
     for angle in ["0", "3.2", "-1"] {
         let line = read(angle).map(|_| ()).expect_err("a refusal").to_string();
         assert!(line.starts_with("joints[0]: angle = ") && line.ends_with("more than 0 and less than pi"), "{line}");

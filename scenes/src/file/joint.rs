@@ -53,11 +53,14 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
     let dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
     let message = "no body of the joint can move: at least one must be dynamic";
     ensure(dynamic(a) || b.is_some_and(dynamic), || message.into())?;
+    let handle = |i: usize| world.bodies.handle(i).unwrap_or(i.into());
+    let between =
+        |anchor_a, anchor_b| Joint { body_b: b.map(handle), ..Joint::to_world(handle(a), anchor_a, anchor_b) };
     let (anchor_a, anchor_b) = match (anchor, anchors) {
         (Some(point), None) => {
             let point = lengths("anchor", *point)?.into();
-            let in_frame = |i: usize| world.bodies[i].rotation.inverse() * (point - world.bodies[i].position);
-            (in_frame(a), b.map_or(point, in_frame))
+            let Joint { anchor_a, anchor_b, .. } = between(point, point).in_world(world);
+            (anchor_a, anchor_b)
         }
         (None, Some([on_a, on_b])) => (lengths("anchors[0]", *on_a)?.into(), lengths("anchors[1]", *on_b)?.into()),
         _ => return Err(Error::input("anchor and anchors: give one of them")),
@@ -66,18 +69,11 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
         Some(force) => positive("break_force", [*force])?[0],
         None => f32::INFINITY,
     };
-    let handle = |i: usize| world.bodies.handle(i).unwrap_or(i.into());
-    let joint = Joint {
-        body_b: b.map(&handle),
-        collide: *collide,
-        enabled: *enabled,
-        break_force,
-        ..Joint::to_world(handle(a), anchor_a, anchor_b)
-    };
+    let joint = Joint { collide: *collide, enabled: *enabled, break_force, ..between(anchor_a, anchor_b) };
     // Choose frames that agree at the present rotations of the bodies.
     let in_world = |frame: Quat| {
-        let on = |body: usize| turn::unit(turn::product(world.bodies[body].rotation.inverse(), frame));
-        Joint { frame_a: on(a), frame_b: b.map_or(frame, on), ..joint }
+        let Joint { frame_a, frame_b, .. } = Joint { frame_a: frame, frame_b: frame, ..joint }.in_world(world);
+        Joint { frame_a, frame_b, ..joint }
     };
     let along = |direction: &[f64; 3]| -> Result<Joint> {
         let direction = Vec3::from(unit("axis", *direction)?);
