@@ -64,7 +64,7 @@ impl State {
 
     /// The state as bytes, the same on every machine.
     pub fn save(&self) -> Vec<u8> {
-        let Self { mut dt, mut steps, mut time, .. } = self.clone();
+        let (mut dt, mut steps, mut time) = (self.dt, self.steps, self.time);
         WORLD_OF_BATCH.seal(|writer| {
             dt.walk(writer)?;
             steps.walk(writer)?;

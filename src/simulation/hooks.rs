@@ -66,9 +66,9 @@ pub trait ContactHooks: Send + Sync {
     }
 
     /// Changes a contact before the step solves it: its friction, rolling and spinning friction, restitution and surface
-    /// velocity, and which of its points act. Each step calls it for every contact of an awake body, even if the surfaces are only near, with the values from the
-    /// materials. A contact with dropped points is computed anew in every step, and does not come to rest as well as a
-    /// reused contact.
+    /// velocity, and which of its points act. Each step calls it for every contact of an awake body, even if the surfaces
+    /// are only near, with the values from the materials. A contact with dropped points is computed anew in every step,
+    /// and does not come to rest as well as a reused contact.
     fn modify(&mut self, world: &World, contact: &mut PendingContact) {
         let _ = (world, contact);
     }
