@@ -1,36 +1,94 @@
-// apply_restitution: one thread makes the points of one manifold bounce that approached faster than the threshold:
-// first together, then each alone.
+// apply_restitution: one thread makes the points of one manifold bounce that meet in this substep: first together, then
+// each alone by its remaining approach. The impulses act when the surfaces meet, so the bodies move before that time with
+// the velocities before them.
 // Reads contacts, points, masses. Writes impulses and movable bodies.
 // No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
 // Twin: src/kernels/contact.rs.
 
-fn bounce(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, impulse: Impulse) -> Wanted {
-    let bounces = -params.restitution_threshold > point.approach_velocity && impulse.peak > 0.0;
+// The impact of a point: its normal velocity before any impact, the speed at which the surfaces meet, and the time from
+// the start of the substep. All are 0 if the point does not bounce.
+struct Impact { approach: f32, speed: f32, time: f32 }
+
+fn impact_at(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, movement: NormalMovement) -> Impact {
+    let h = pass_row.substep;
+    let s = current_separation(movement, contact, point);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
-    let lacking = -(vn + contact.restitution * point.approach_velocity);
-    let sum = larger(impulse.normal + point.normal_mass * lacking, 0.0);
-    return Wanted(select(impulse.normal, sum, bounces), lacking);
+    let elapsed = select((*pair).b.time, (*pair).a.time, (*pair).mass_a.inv_mass > 0.0);
+    let start = smaller(vn - point.pull * h, 0.0);
+    let gap = s - point.pull * (0.5 * h * elapsed);
+    let square = start * start - (point.pull + point.pull) * gap;
+    let root = select(0.0, square * inverse_sqrt(square), square > 0.0);
+    // Exact without acceleration.
+    let speed = -start - (point.pull + point.pull) * gap * reciprocal(root - start);
+    let time = larger((gap + gap) * reciprocal(speed - start), -h);
+    if -s > vn * h && will_bounce(contact, vn) && square > 0.0 { return Impact(vn, speed, time); }
+    return Impact(0.0, 0.0, 0.0);
+}
+
+// Moves a body back by the time in which it still had its former velocities.
+fn delayed(body: Body, before: Body, delay: f32) -> Body {
+    let dp = body.dp - (body.v - before.v) * delay;
+    let dq = renormalized(quat_mul(exp_rotation((before.w - body.w) * delay), body.dq));
+    return Body(body.v, body.w, dp, body.time, dq);
+}
+
+// Adds the change of a body's velocities to those without impulses, so that no later substep repeats it.
+fn keep_bounce(i: u32, mass: Mass, body: Body, before: Body) {
+    let v = body.v - before.v;
+    let w = body.w - before.w;
+    if mass.inv_mass > 0.0 && dot3(v, v) + dot3(w, w) > 0.0 {
+        free[i].v = free[i].v + v;
+        free[i].w = free[i].w + w;
+    }
+}
+
+// Stores the movement of a body that can move.
+fn store_movement(i: u32, mass: Mass, body: Body) {
+    if mass.inv_mass > 0.0 {
+        bodies[i].dp = body.dp;
+        bodies[i].dq = body.dq;
+    }
 }
 
 fn restitute_contact(rules: Rules, i: u32) {
     let contact = contacts[i];
+    let factor = 1.0 + contact.restitution;
     var pair = load_pair(contact.body_a, contact.body_b);
+    let movement = normal_movement(rules, &pair, contact);
+    let before_a = pair.a;
+    let before_b = pair.b;
+    var impacts: array<Impact, 4>;
     var together = Together();
     for (var k = 0u; k < contact.point_count; k++) {
         let point = points[contact.first_point + k];
-        let impulse = impulses[contact.first_point + k];
-        add_point(&together, k, point, impulse.normal, bounce(rules, &pair, contact, point, impulse));
+        impacts[k] = impact_at(rules, &pair, contact, point, movement);
+        let lacking = factor * impacts[k].speed;
+        add_point(&together, k, point, Wanted(point.normal_mass * lacking, lacking));
     }
-    press_as_one(rules, &pair, contact, &together);
-    for (var k = contact.first_point; k < contact.first_point + contact.point_count; k++) {
-        let point = points[k];
-        var impulse = impulses[k];
-        let sum = bounce(rules, &pair, contact, point, impulse).sum;
-        let change = sum - impulse.normal;
-        impulse.normal = sum;
-        impulse.peak = larger(impulse.peak, impulse.normal);
-        impulses[k] = impulse;
-        apply_impulse(rules.isotropic, &pair, point.r_a, point.r_b, contact.normal * change);
+    let share = press_as_one(rules, &pair, contact, &together);
+    var all = 0.0;
+    var delay = 0.0;
+    for (var k = 0u; k < contact.point_count; k++) {
+        let point = points[contact.first_point + k];
+        let impact = impacts[k];
+        let vn = dot3(relative_velocity(rules, &pair, point.r_a, point.r_b), contact.normal);
+        let left = select(0.0, larger(impact.speed + (impact.approach - vn), 0.0), impact.speed > 0.0);
+        let own = point.normal_mass * (factor * left);
+        apply_impulse(rules.isotropic, &pair, point.r_a, point.r_b, contact.normal * own);
+        let bounce = share * together.changes[k] + own;
+        impulses[contact.first_point + k].bounce = bounce;
+        all = all + bounce;
+        delay = delay + bounce * impact.time;
+    }
+    if all > 0.0 {
+        keep_locks(&pair);
+        delay = delay * reciprocal(all);
+        store_movement(contact.body_a, pair.mass_a, delayed(pair.a, before_a, delay));
+        store_movement(contact.body_b, pair.mass_b, delayed(pair.b, before_b, delay));
+        if !rules.from_start {
+            keep_bounce(contact.body_a, pair.mass_a, pair.a, before_a);
+            keep_bounce(contact.body_b, pair.mass_b, pair.b, before_b);
+        }
     }
     store_pair(contact.body_a, contact.body_b, &pair);
 }

@@ -4,5 +4,5 @@
 fn clear_contact(i: u32) {
     let contact = contacts[i];
     let end = contact.first_point + contact.point_count + params.patches;
-    for (var k = contact.first_point; k < end; k++) { impulses[k] = Impulse(0.0, 0.0, 0.0, impulses[k].peak); }
+    for (var k = contact.first_point; k < end; k++) { impulses[k] = Impulse(0.0, 0.0, 0.0, 0.0); }
 }

@@ -29,7 +29,7 @@ fn extrapolate(is_first: bool, measured: bool, first: u32, stride: u32) {
     for (var i = first; i < params.point_count; i += stride) {
         let impulse = impulses[i];
         let r = extrapolated_impulse(is_first, i, vec3f(impulse.normal, impulse.tangent_1, impulse.tangent_2));
-        impulses[i] = Impulse(r.x, r.y, r.z, impulse.peak);
+        impulses[i] = Impulse(r.x, r.y, r.z, impulse.bounce);
     }
     for (var i = first; i < params.joint_count + params.axis_count; i += stride) {
         joint_impulses[i].linear = extrapolated_impulse(is_first, params.point_count + i, joint_impulses[i].linear);

@@ -9,6 +9,7 @@ fn integrate_position(is_from_start: bool, i: u32) {
         v = free[i].v + v;
         w = free[i].w + w;
     }
+    bodies[i].time = body.time + pass_row.substep;
     bodies[i].dp = body.dp + v * pass_row.substep;
     bodies[i].dq = renormalized(quat_mul(exp_rotation(w * pass_row.substep), body.dq));
 }

@@ -8,7 +8,8 @@ fn sum_contact(is_first: bool, i: u32) {
     for (var k = contact.first_point; k < end; k++) {
         let now = impulses[k];
         let before = totals[k];
-        let sum = Impulse(before.normal + now.normal, before.tangent_1 + now.tangent_1, before.tangent_2 + now.tangent_2, 0.0);
-        if is_first { totals[k] = Impulse(now.normal, now.tangent_1, now.tangent_2, 0.0); } else { totals[k] = sum; }
+        let normal = now.normal + now.bounce;
+        let sum = Impulse(before.normal + normal, before.tangent_1 + now.tangent_1, before.tangent_2 + now.tangent_2, 0.0);
+        if is_first { totals[k] = Impulse(normal, now.tangent_1, now.tangent_2, 0.0); } else { totals[k] = sum; }
     }
 }

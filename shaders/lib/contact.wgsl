@@ -46,21 +46,30 @@ fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, 
     let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
     // This limits the speed and not the force, so a contact at the limit still carries any load.
     let correction = select(spring, smaller(spring, -(mass * (vn - softness.push_limit))), rules.biased);
+    if rules.bounces && will_bounce(contact, vn) { return 0.0; }
     return params.relaxation * correction;
 }
+
+// Whether a point with this normal velocity bounces when it touches. Sweeps leave it to the next impact.
+fn will_bounce(contact: Contact, vn: f32) -> bool { return contact.restitution > 0.0 && -vn > params.restitution_threshold; }
 
 fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
     let correction = normal_correction(rules, pair, contact, point, softness, movement, (*impulse).normal);
     let sum = clamp_normal(rules, (*impulse).normal, correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;
-    if rules.bounces { (*impulse).peak = larger((*impulse).peak, sum); }
     note_correction(rules.measured, change, point.normal_mass);
     apply_impulse(rules.isotropic, pair, point.r_a, point.r_b, contact.normal * change);
 }
 
-// The impulse that a point would have by itself, and the normal velocity that it lacks.
-struct Wanted { sum: f32, lacking: f32 }
+// The change of the impulse that a point needs by itself, and the normal velocity that it lacks.
+struct Wanted { change: f32, lacking: f32 }
+
+// The normal impulse of a point in the substep, which limits friction.
+fn pressing(rules: Rules, impulse: Impulse) -> f32 {
+    if rules.bounces { return impulse.normal + impulse.bounce; }
+    return impulse.normal;
+}
 
 // The points of a manifold together: the change of each, the sums of their arms weighted by changes and unweighted,
 // their number, and the sums of changes, gains and masses.
@@ -68,8 +77,8 @@ struct Together {
     changes: array<f32, 4>, arms_a: vec3f, arms_b: vec3f, middle_a: vec3f, middle_b: vec3f, count: f32, all: f32, gain: f32, mass: f32
 }
 
-fn add_point(together: ptr<function, Together>, k: u32, point: Point, impulse: f32, wanted: Wanted) {
-    let change = wanted.sum - impulse;
+fn add_point(together: ptr<function, Together>, k: u32, point: Point, wanted: Wanted) {
+    let change = wanted.change;
     (*together).changes[k] = change;
     (*together).arms_a += point.r_a * change;
     (*together).arms_b += point.r_b * change;
@@ -82,10 +91,9 @@ fn add_point(together: ptr<function, Together>, k: u32, point: Point, impulse: f
     (*together).mass = (*together).mass + point.normal_mass;
 }
 
-// Changes the impulses of all points of a manifold together, by steepest descent. The direction is the vector of the
-// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
-// still lack.
-fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, together: ptr<function, Together>) {
+// Applies impulses at all points of a manifold together, by steepest descent: a share of the changes that the points
+// need by themselves, which it returns. It minimizes the energy of the velocities that the points still lack.
+fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, together: ptr<function, Together>) -> f32 {
     let turn_a = cross3((*together).arms_a, contact.normal);
     let turn_b = cross3((*together).arms_b, contact.normal);
     let spin_a = spin_of(rules.isotropic, (*pair).mass_a, turn_a);
@@ -100,17 +108,12 @@ fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, toget
     let alike = reciprocal((*together).mass * (((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turning));
     let best = smaller((*together).gain * reciprocal(moved), larger(alike, 1.0));
     let share = select(0.0, best, (*together).count > 1.0 && (*together).gain > 0.0);
-    for (var k = 0u; k < contact.point_count; k++) {
-        var impulse = impulses[contact.first_point + k];
-        impulse.normal = impulse.normal + share * (*together).changes[k];
-        if rules.bounces { impulse.peak = larger(impulse.peak, impulse.normal); }
-        impulses[contact.first_point + k] = impulse;
-    }
     let push = contact.normal * (share * all);
     (*pair).a.v -= push * (*pair).mass_a.inv_mass;
     (*pair).a.w -= spin_a * share;
     (*pair).b.v += push * (*pair).mass_b.inv_mass;
     (*pair).b.w += spin_b * share;
+    return share;
 }
 
 // Non-penetration of all points together, before each is solved alone.
@@ -121,7 +124,11 @@ fn solve_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, softn
         let impulse = impulses[contact.first_point + k].normal;
         let correction = normal_correction(rules, pair, contact, point, softness, movement, impulse);
         let lacking = select(0.0, correction * reciprocal(point.normal_mass), point.normal_mass > 0.0);
-        add_point(&together, k, point, impulse, Wanted(clamp_normal(rules, impulse, correction), lacking));
+        add_point(&together, k, point, Wanted(clamp_normal(rules, impulse, correction) - impulse, lacking));
     }
-    press_as_one(rules, pair, contact, &together);
+    let share = press_as_one(rules, pair, contact, &together);
+    for (var k = 0u; k < contact.point_count; k++) {
+        let i = contact.first_point + k;
+        impulses[i].normal = impulses[i].normal + share * together.changes[k];
+    }
 }

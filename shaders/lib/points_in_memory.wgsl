@@ -24,8 +24,9 @@ fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, hel
         var pressed = 0.0;
         var lever = 0.0;
         for (var k = contact.first_point; k < end; k++) {
-            pressed += impulses[k].normal;
-            lever += impulses[k].normal * points[k].slip_1;
+            let normal = pressing(rules, impulses[k]);
+            pressed += normal;
+            lever += normal * points[k].slip_1;
         }
         var impulse = impulses[end];
         solve_twist(rules, pair, contact, points[end], lever, &impulse);
@@ -34,13 +35,13 @@ fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, hel
     } else {
         for (var k = contact.first_point; k < end; k++) {
             var impulse = impulses[k];
-            solve_friction(rules, pair, contact, points[k], impulse.normal, &impulse);
+            solve_friction(rules, pair, contact, points[k], pressing(rules, impulse), &impulse);
             impulses[k] = impulse;
         }
     }
     if rules.rolls {
         var all = 0.0;
-        for (var k = contact.first_point; k < end; k++) { all += impulses[k].normal; }
+        for (var k = contact.first_point; k < end; k++) { all += pressing(rules, impulses[k]); }
         var impulse = impulses[end];
         solve_rolling(rules, pair, contact, points[end], all, &impulse);
         impulses[end] = impulse;

@@ -47,7 +47,7 @@ fn sweep_normals(rules: Rules, pair: ptr<function, Pair>, contact: Contact, held
 
 fn friction_at(k: u32, rules: Rules, pair: ptr<function, Pair>, contact: Contact, held: ptr<function, Held>) {
     var impulse = (*held).impulses[k];
-    solve_friction(rules, pair, contact, (*held).points[k], impulse.normal, &impulse);
+    solve_friction(rules, pair, contact, (*held).points[k], pressing(rules, impulse), &impulse);
     (*held).impulses[k] = impulse;
 }
 
@@ -65,18 +65,18 @@ fn rolling_at(k: u32, rules: Rules, pair: ptr<function, Pair>, contact: Contact,
 }
 
 // The normal impulse of a point, and its product with the distance from the middle of the patch.
-fn pressed_at(k: u32, held: ptr<function, Held>) -> vec2f {
-    let normal = (*held).impulses[k].normal;
+fn pressed_at(k: u32, rules: Rules, held: ptr<function, Held>) -> vec2f {
+    let normal = pressing(rules, (*held).impulses[k]);
     return vec2f(normal, normal * (*held).points[k].slip_1);
 }
 
 fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, held: ptr<function, Held>) {
     let count = contact.point_count;
     if is_at_patch(rules) {
-        var pressed = vec2f() + pressed_at(0u, held);
-        if count > 1u { pressed += pressed_at(1u, held); }
-        if count > 2u { pressed += pressed_at(2u, held); }
-        if count > 3u { pressed += pressed_at(3u, held); }
+        var pressed = vec2f() + pressed_at(0u, rules, held);
+        if count > 1u { pressed += pressed_at(1u, rules, held); }
+        if count > 2u { pressed += pressed_at(2u, rules, held); }
+        if count > 3u { pressed += pressed_at(3u, rules, held); }
         if count == 1u { patch_friction_at(1u, rules, pair, contact, held, pressed.x, pressed.y); }
         if count == 2u { patch_friction_at(2u, rules, pair, contact, held, pressed.x, pressed.y); }
         if count == 3u { patch_friction_at(3u, rules, pair, contact, held, pressed.x, pressed.y); }
@@ -88,10 +88,10 @@ fn sweep_friction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, hel
         if count > 3u { friction_at(3u, rules, pair, contact, held); }
     }
     if rules.rolls {
-        var pressed = 0.0 + (*held).impulses[0].normal;
-        if count > 1u { pressed += (*held).impulses[1].normal; }
-        if count > 2u { pressed += (*held).impulses[2].normal; }
-        if count > 3u { pressed += (*held).impulses[3].normal; }
+        var pressed = 0.0 + pressing(rules, (*held).impulses[0]);
+        if count > 1u { pressed += pressing(rules, (*held).impulses[1]); }
+        if count > 2u { pressed += pressing(rules, (*held).impulses[2]); }
+        if count > 3u { pressed += pressing(rules, (*held).impulses[3]); }
         if count == 1u { rolling_at(1u, rules, pair, contact, held, pressed); }
         if count == 2u { rolling_at(2u, rules, pair, contact, held, pressed); }
         if count == 3u { rolling_at(3u, rules, pair, contact, held, pressed); }

@@ -20,7 +20,7 @@ struct Rules {
     from_start: bool,
     // Every movable body has the same moment of inertia about all axes.
     isotropic: bool,
-    // Points keep the largest normal impulse of the step.
+    // Points bounce, and friction counts the impulses by which they do.
     bounces: bool,
 }
 

@@ -1,7 +1,7 @@
 // The rows of a StepProblem. src/problem/rows.rs has the layout, names and units, and tests/cpu/shaders.rs compares the
 // layouts.
 
-struct Body { v: vec3f, w: vec3f, dp: vec3f, dq: vec4f }
+struct Body { v: vec3f, w: vec3f, dp: vec3f, time: f32, dq: vec4f }
 
 struct Free { v: vec3f, w: vec3f }
 
@@ -27,7 +27,7 @@ struct Contact {
 struct Point {
     r_a: vec3f, separation: f32,
     r_b: vec3f, normal_mass: f32,
-    tangent_mass: f32, approach_velocity: f32, slip_1: f32, slip_2: f32,
+    tangent_mass: f32, pull: f32, slip_1: f32, slip_2: f32,
 }
 
 struct Joint { r_a: vec3f, body_a: u32, r_b: vec3f, body_b: u32, gap: vec3f, is_loose: f32, first_axis: u32, axis_count: u32, frame_a: vec4f, frame_b: vec4f }
@@ -57,7 +57,7 @@ struct Turning { inv_inertia_x: vec3f, body: u32, inv_inertia_yz: vec3f }
 
 struct Convergence { moving: atomic<u32>, done: u32, sweeps: u32, planned: u32 }
 
-struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, peak: f32 }
+struct Impulse { normal: f32, tangent_1: f32, tangent_2: f32, bounce: f32 }
 
 struct ImpulseStep { before: vec3f, begin: vec3f }
 

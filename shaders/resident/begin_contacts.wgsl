@@ -33,7 +33,7 @@ fn begin_contact(at: u32) {
     }
     for (var k = contact.first_point; k < end + params.patches; k++) {
         if resident.preload.warm_start == 1u {
-            impulses[k].peak = 0.0;
+            impulses[k].bounce = 0.0;
         } else {
             impulses[k] = Impulse(0.0, 0.0, 0.0, 0.0);
         }

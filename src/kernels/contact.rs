@@ -6,11 +6,14 @@
 
 use super::Rules;
 use super::friction::{solve_friction, solve_rolling, solve_twist};
-use super::pair::{apply_angular_impulse, apply_impulse, note_correction, relative_velocity, spin_of};
-use super::rows::{Contact, Impulse, Pair, Point, SoftnessOf, StepParams};
+use super::pair::{apply_angular_impulse, apply_impulse, keep_locks, note_correction, relative_velocity, spin_of};
+use super::rows::{Body, Contact, Free, Impulse, Pair, Point, SoftnessOf, StepParams};
 use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
-use crate::math::{Lane, NormalMovement, Vec3, cross3, dot3, larger, reciprocal, smaller};
+use crate::math::{
+    Lane, NormalMovement, Quat, Vec3, cross3, dot3, exp_rotation, larger, quat_mul, reciprocal, renormalized, select3,
+    smaller, vec3,
+};
 
 /// The points of a manifold and their impulses, in any storage.
 pub trait PointRows<L> {
@@ -24,8 +27,8 @@ pub trait PointRows<L> {
     fn set_normal(&mut self, k: usize, normal: L);
     /// Changes the friction of a point.
     fn set_friction(&mut self, k: usize, tangent_1: L, tangent_2: L);
-    /// Changes the largest normal impulse of a point.
-    fn set_peak(&mut self, k: usize, peak: L);
+    /// Changes the impulse by which a point bounced.
+    fn set_bounce(&mut self, k: usize, bounce: L);
 }
 
 impl<L: Lane> PointRows<L> for (&[Point<L>], &mut [Impulse<L>]) {
@@ -44,8 +47,8 @@ impl<L: Lane> PointRows<L> for (&[Point<L>], &mut [Impulse<L>]) {
     fn set_friction(&mut self, k: usize, tangent_1: L, tangent_2: L) {
         (self.1[k].tangent_1, self.1[k].tangent_2) = (tangent_1, tangent_2);
     }
-    fn set_peak(&mut self, k: usize, peak: L) {
-        self.1[k].peak = peak;
+    fn set_bounce(&mut self, k: usize, bounce: L) {
+        self.1[k].bounce = bounce;
     }
 }
 
@@ -118,7 +121,14 @@ fn normal_correction<L: Lane>(
     let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
     // This limits the speed and not the force, so a contact at the limit still carries any load.
     let correction = if rules.biased { smaller(spring, -(mass * (vn - softness.push_limit))) } else { spring };
-    params.relaxation * correction
+    let correction = params.relaxation * correction;
+    if rules.bounces { L::select(correction, zero, will_bounce(params, contact, vn)) } else { correction }
+}
+
+/// Whether a point with this normal velocity bounces when it touches. Sweeps leave it to the next impact.
+#[inline(always)]
+fn will_bounce<L: Lane>(params: &StepParams<L>, contact: &Contact<L>, vn: L) -> L::Mask {
+    L::and(contact.restitution.gt(L::constant(0.0)), (-vn).gt(params.restitution_threshold))
 }
 
 /// Non-penetration at one point.
@@ -136,37 +146,29 @@ fn solve_normal<L: Lane>(
     let sum = clamp_normal(rules, impulse.normal, correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
-    if rules.bounces {
-        impulse.peak = larger(impulse.peak, sum);
-    }
     note_correction(rules, params, pair, change, point.normal_mass);
     apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
 }
 
-/// Changes the impulses of all points of a manifold together, by steepest descent. The direction is the vector of the
-/// changes that the points need by themselves. The step length minimizes the energy of the velocities that the points
-/// still lack. `wanted` gives the impulse that a point would have by itself, and the normal velocity that it lacks. The
-/// common change of all points is one impulse at their middle, and no point takes more than its share because it comes
-/// first. A point may pull after this, until it is solved alone. `wanted` is an array, because a closure
-/// would be compiled without SIMD instructions.
+/// Applies impulses at all points of a manifold together, by steepest descent: a share of the `changes` that the points
+/// need by themselves, which it returns. It minimizes the energy of the velocities that the points still lack. `wanted`
+/// has the change of each point, and the normal velocity that the point lacks. The common change of all points is one
+/// impulse at their middle, and no point takes more than its share because it comes first. A point may pull after this,
+/// until it is solved alone. `wanted` is an array, because a closure would be compiled without SIMD instructions.
 #[inline(always)]
 fn press_as_one<L: Lane>(
     rules: Rules,
     pair: &mut Pair<L>,
     contact: &Contact<L>,
-    rows: &mut impl PointRows<L>,
+    rows: &impl PointRows<L>,
     wanted: &[(L, L); MAX_POINTS],
-) {
+) -> L {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
-    let mut changes = [zero; MAX_POINTS];
     let (mut arms_a, mut arms_b) = (Vec3::default(), Vec3::default());
     let (mut count, mut all, mut gain, mut mass) = (zero, zero, zero, zero);
     let (mut middle_a, mut middle_b) = (Vec3::default(), Vec3::default());
-    for (k, own) in changes.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
+    for (k, &(change, lacking)) in wanted.iter().enumerate().take(rules.contact_points(rows.count())) {
         let point = rows.point(k);
-        let (sum, lacking) = wanted[k];
-        let change = sum - rows.impulse(k).normal;
-        *own = change;
         arms_a += point.r_a * change;
         arms_b += point.r_b * change;
         all = all + change;
@@ -191,19 +193,12 @@ fn press_as_one<L: Lane>(
     let alike = reciprocal(mass * ((pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning));
     let best = smaller(gain * reciprocal(moved), larger(alike, one));
     let share = L::select(zero, best, L::and(count.gt(one), gain.gt(zero)));
-    for (k, &change) in changes.iter().enumerate().take(rules.contact_points(rows.count())) {
-        let impulse = rows.impulse(k);
-        let sum = impulse.normal + share * change;
-        rows.set_normal(k, sum);
-        if rules.bounces {
-            rows.set_peak(k, larger(impulse.peak, sum));
-        }
-    }
     let push = contact.normal * (share * all);
     pair.a.v -= push * pair.mass_a.inv_mass;
     pair.a.w -= spin_a * share;
     pair.b.v += push * pair.mass_b.inv_mass;
     pair.b.w += spin_b * share;
+    share
 }
 
 /// The velocity that a point lacks, from its unclamped `correction`; 0 if the point has no mass.
@@ -229,22 +224,28 @@ fn solve_as_one<L: Lane>(
     for (k, wanted) in wanted.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
         let (point, impulse) = (rows.point(k), rows.impulse(k));
         let correction = normal_correction(rules, params, common, pair, contact, &point, impulse.normal);
-        *wanted = (clamp_normal(rules, impulse.normal, correction), lacking(&point, correction));
+        let change = clamp_normal(rules, impulse.normal, correction) - impulse.normal;
+        *wanted = (change, lacking(&point, correction));
     }
-    press_as_one(rules, pair, contact, rows, &wanted);
+    let share = press_as_one(rules, pair, contact, rows, &wanted);
+    for (k, &(change, _)) in wanted.iter().enumerate().take(rules.contact_points(rows.count())) {
+        let normal = rows.impulse(k).normal + share * change;
+        rows.set_normal(k, normal);
+    }
 }
 
-/// Clears the impulse of one point, but not its peak. Kernel `clear_impulses`.
+/// Clears the impulse of one point. Kernel `clear_impulses`.
 #[inline(always)]
 pub fn clear_impulse<L: Lane>(impulse: &mut Impulse<L>) {
-    *impulse = Impulse { peak: impulse.peak, ..Impulse::default() };
+    *impulse = Impulse::default();
 }
 
 /// Adds the impulse of one point in a substep to the sum of earlier substeps. Kernel `sum_impulses`.
 #[inline(always)]
 pub fn sum_impulse<L: Lane>(is_first: bool, impulse: &Impulse<L>, total: &mut Impulse<L>) {
-    total.set_components(summed(is_first, total.components(), impulse.components()));
-    total.peak = L::constant(0.0);
+    let Vec3 { x, y, z } = impulse.components();
+    total.set_components(summed(is_first, total.components(), vec3(x + impulse.bounce, y, z)));
+    total.bounce = L::constant(0.0);
 }
 
 /// The impulse of a substep added to the sum of earlier substeps. The first substep begins the sum. Kernel
@@ -300,9 +301,6 @@ pub fn solve_contact<L: Lane>(
             let mut impulse = rows.impulse(k);
             solve_normal(rules, params, &common, pair, contact, &rows.point(k), &mut impulse);
             rows.set_normal(k, impulse.normal);
-            if rules.bounces {
-                rows.set_peak(k, impulse.peak);
-            }
         }
         if has_friction && !rules.friction_first {
             sweep_friction(rules, params, pair, contact, rows);
@@ -322,7 +320,7 @@ fn sweep_friction<L: Lane>(
     if rules.is_at_patch() {
         let (mut pressed, mut lever) = (L::constant(0.0), L::constant(0.0));
         for k in 0..end {
-            let normal = rows.impulse(k).normal;
+            let normal = rows.impulse(k).pressing(rules);
             pressed = pressed + normal;
             lever = lever + normal * rows.point(k).slip_1;
         }
@@ -336,10 +334,11 @@ fn sweep_friction<L: Lane>(
     let mut pressed = L::constant(0.0);
     for k in 0..end {
         let mut impulse = rows.impulse(k);
-        solve_friction(rules, params, pair, contact, &rows.point(k), impulse.normal, &mut impulse);
+        let normal = impulse.pressing(rules);
+        solve_friction(rules, params, pair, contact, &rows.point(k), normal, &mut impulse);
         rows.set_friction(k, impulse.tangent_1, impulse.tangent_2);
         if rules.rolls {
-            pressed = pressed + impulse.normal;
+            pressed = pressed + normal;
         }
     }
     if rules.rolls {
@@ -350,7 +349,62 @@ fn sweep_friction<L: Lane>(
     }
 }
 
-/// Makes the points that were hit fast enough bounce: first together, then each alone. Kernel `apply_restitution`.
+/// The impact of a point within a substep.
+#[derive(Clone, Copy)]
+struct Impact<L> {
+    /// Normal velocity before any impact; 0 if the point does not bounce.
+    approach: L,
+    /// Speed at which the surfaces meet.
+    speed: L,
+    /// Time from the start of the substep.
+    time: L,
+}
+
+/// The impact of a point, if it closes within the substep and faster than the threshold. Its time is below zero if the
+/// surfaces met in the substep before, whose sweeps left them to this impact.
+///
+/// Until the end of the step, a free body is further along its acceleration by half a substep times the change of its
+/// velocity ([`crate::problem::follow_parabolas`]).
+#[inline(always)]
+fn impact<L: Lane>(
+    rules: Rules,
+    params: &StepParams<L>,
+    movement: &NormalMovement<L>,
+    pair: &Pair<L>,
+    contact: &Contact<L>,
+    point: &Point<L>,
+) -> Impact<L> {
+    let (zero, half, h) = (L::constant(0.0), L::constant(0.5), params.substep);
+    let s = current_separation(movement, contact, point);
+    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
+    let elapsed = L::select(pair.b.time, pair.a.time, pair.mass_a.inv_mass.gt(zero));
+    let start = smaller(vn - point.pull * h, zero);
+    let gap = s - point.pull * (half * h * elapsed);
+    let square = start * start - (point.pull + point.pull) * gap;
+    let root = L::select(zero, square * square.inverse_sqrt(), square.gt(zero));
+    // Exact without acceleration.
+    let speed = -start - (point.pull + point.pull) * gap * reciprocal(root - start);
+    let time = larger((gap + gap) * reciprocal(speed - start), -h);
+    let bounces = L::and(L::and((-s).gt(vn * h), will_bounce(params, contact, vn)), square.gt(zero));
+    Impact {
+        approach: L::select(zero, vn, bounces),
+        speed: L::select(zero, speed, bounces),
+        time: L::select(zero, time, bounces),
+    }
+}
+
+/// Adds the change of a body's velocities by bounces to those without impulses, so that no later substep repeats it.
+#[inline(always)]
+pub fn keep_bounces<L: Lane>(before: &Free<L>, after: &Body<L>, free: &mut Free<L>) {
+    let (v, w) = (after.v - before.v, after.w - before.w);
+    // Velocities of bodies that do not bounce keep every bit.
+    let bounces = (dot3(v, v) + dot3(w, w)).gt(L::constant(0.0));
+    (free.v, free.w) = (select3(free.v, free.v + v, bounces), select3(free.w, free.w + w, bounces));
+}
+
+/// Makes the points bounce that meet in this substep: first together, then each alone by its remaining approach. The
+/// impulses act when the surfaces meet, so the bodies move before that time with the velocities before them. Kernel
+/// `apply_restitution`.
 #[inline(always)]
 pub fn restitute_contact<L: Lane>(
     rules: Rules,
@@ -359,36 +413,39 @@ pub fn restitute_contact<L: Lane>(
     contact: &Contact<L>,
     rows: &mut impl PointRows<L>,
 ) {
-    let mut wanted = [(L::constant(0.0), L::constant(0.0)); MAX_POINTS];
-    for (k, wanted) in wanted.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
-        *wanted = bounce(rules, params, pair, contact, &rows.point(k), &rows.impulse(k));
+    let (zero, factor) = (L::constant(0.0), L::constant(1.0) + contact.restitution);
+    let movement = normal_movement(rules, pair, contact);
+    let before = [pair.a, pair.b];
+    let mut wanted = [(zero, zero); MAX_POINTS];
+    let mut impacts = [Impact { approach: zero, speed: zero, time: zero }; MAX_POINTS];
+    let end = rules.contact_points(rows.count());
+    for k in 0..end {
+        let point = rows.point(k);
+        impacts[k] = impact(rules, params, &movement, pair, contact, &point);
+        let lacking = factor * impacts[k].speed;
+        wanted[k] = (point.normal_mass * lacking, lacking);
     }
-    press_as_one(rules, pair, contact, rows, &wanted);
-    for k in 0..rules.contact_points(rows.count()) {
-        let (point, impulse) = (rows.point(k), rows.impulse(k));
-        let (sum, _) = bounce(rules, params, pair, contact, &point, &impulse);
-        let change = sum - impulse.normal;
-        rows.set_normal(k, sum);
-        rows.set_peak(k, larger(impulse.peak, sum));
-        apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * change);
+    let share = press_as_one(rules, pair, contact, rows, &wanted);
+    let (mut all, mut delay) = (zero, zero);
+    for k in 0..end {
+        let (point, Impact { approach, speed, time }) = (rows.point(k), impacts[k]);
+        let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
+        let left = L::select(zero, larger(speed + (approach - vn), zero), speed.gt(zero));
+        let own = point.normal_mass * (factor * left);
+        apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * own);
+        let bounce = share * wanted[k].0 + own;
+        rows.set_bounce(k, bounce);
+        all = all + bounce;
+        delay = delay + bounce * time;
     }
-}
-
-/// The normal impulse with which a point bounces by itself, if it was hit fast enough, and the normal velocity that it
-/// lacks.
-#[inline(always)]
-fn bounce<L: Lane>(
-    rules: Rules,
-    params: &StepParams<L>,
-    pair: &Pair<L>,
-    contact: &Contact<L>,
-    point: &Point<L>,
-    impulse: &Impulse<L>,
-) -> (L, L) {
-    let zero = L::constant(0.0);
-    let hit = (-params.restitution_threshold).gt(point.approach_velocity);
-    let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
-    let lacking = -(vn + contact.restitution * point.approach_velocity);
-    let sum = larger(impulse.normal + point.normal_mass * lacking, zero);
-    (L::select(impulse.normal, sum, L::and(hit, impulse.peak.gt(zero))), lacking)
+    if L::any(all.gt(zero)) {
+        keep_locks(pair);
+        let bounces = all.gt(zero);
+        let delay = L::select(zero, delay * reciprocal(all), bounces);
+        for (body, before) in [&mut pair.a, &mut pair.b].into_iter().zip(&before) {
+            body.dp -= (body.v - before.v) * delay;
+            let dq = renormalized(quat_mul(exp_rotation((before.w - body.w) * delay), body.dq));
+            body.dq = Quat { axis: select3(body.dq.axis, dq.axis, bounces), w: L::select(body.dq.w, dq.w, bounces) };
+        }
+    }
 }

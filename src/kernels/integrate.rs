@@ -80,6 +80,7 @@ pub fn integrate_positions<L: Lane>(from_start: bool, params: &StepParams<L>, bo
     if from_start {
         (v, w) = (free.v + v, free.w + w);
     }
+    body.time = body.time + params.substep;
     body.dp += v * params.substep;
     body.dq = renormalized(quat_mul(exp_rotation(w * params.substep), body.dq));
 }

@@ -95,6 +95,12 @@ impl Rules {
         Self { friction, patch, rolls, isotropic, ..Self::default() }
     }
 
+    /// The rules of restitution.
+    pub fn of_restitution(self) -> Self {
+        let Self { patch, round, from_start, isotropic, .. } = self;
+        Self { patch, round, from_start, isotropic, ..Self::default() }
+    }
+
     /// The rules of joints.
     pub fn of_joints(self) -> Self {
         let Self { biased, measured, from_start, axes, .. } = self;

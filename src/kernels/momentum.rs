@@ -18,6 +18,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
+use super::Rules;
 use super::rows::{Impulse, ImpulseStep, Momentum};
 use crate::math::{Lane, Scalar, Vec3, dot3, reciprocal, vec3};
 
@@ -72,6 +73,12 @@ impl<L: Lane> Impulse<L> {
     #[inline(always)]
     pub fn components(&self) -> Vec3<L> {
         vec3(self.normal, self.tangent_1, self.tangent_2)
+    }
+
+    /// The normal impulse of the substep, which limits friction.
+    #[inline(always)]
+    pub fn pressing(&self, rules: Rules) -> L {
+        if rules.bounces { self.normal + self.bounce } else { self.normal }
     }
 
     /// Sets the three components.

@@ -16,6 +16,8 @@ pub struct Body<L> {
     pub w: Vec3<L>,
     /// Movement since the step began.
     pub dp: Vec3<L>,
+    /// Time since the step began.
+    pub time: L,
     /// Rotation since the step began.
     pub dq: Quat<L>,
 }
@@ -88,8 +90,8 @@ pub struct Point<L> {
     pub normal_mass: L,
     /// Effective mass in the tangential plane.
     pub tangent_mass: L,
-    /// Normal velocity when the step begins.
-    pub approach_velocity: L,
+    /// Acceleration of b relative to a along the normal.
+    pub pull: L,
     /// Slip along the first tangent; with friction per manifold, distance from the patch. See `PointRow`.
     pub slip_1: L,
     /// Slip along the second tangent.
@@ -150,8 +152,8 @@ pub struct Impulse<L> {
     pub tangent_1: L,
     /// Along the second tangent.
     pub tangent_2: L,
-    /// Largest normal impulse so far.
-    pub peak: L,
+    /// Normal impulse by which the point bounced in this substep.
+    pub bounce: L,
 }
 
 /// One impulse between two accelerated sweeps. Twin of the WGSL struct `ImpulseStep`.
@@ -255,14 +257,14 @@ macro_rules! stored {
 }
 
 stored! {
-    Body as BodyRow { Vec3: v, w, dp; Quat: dq; [] }
+    Body as BodyRow { Vec3: v, w, dp; Quat: dq; [time] }
     Damping as DampingRow { Vec3: linear_gain, angular_gain; [linear_loss, angular_loss] }
     Inertia as InertiaRow { Vec3: principal, inv_principal; Quat: frame; [] }
     Contact as ContactRow { Vec3: normal, tangent; [friction, restitution, radius_a, radius_b, preload] }
     Point as PointRow {
-        Vec3: r_a, r_b; [separation, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2]
+        Vec3: r_a, r_b; [separation, normal_mass, tangent_mass, pull, slip_1, slip_2]
     }
-    Impulse as ImpulseRow { [normal, tangent_1, tangent_2, peak] }
+    Impulse as ImpulseRow { [normal, tangent_1, tangent_2, bounce] }
     Joint as JointRow { Vec3: r_a, r_b, gap; Quat: frame_a, frame_b; [is_loose] }
     Axis as AxisRow {
         Vec3: direction; [coordinate, gap, left, speed, max_impulse, rate, mass_scale, impulse_scale, start]

@@ -191,7 +191,7 @@ impl Kernel {
     }
 
     /// Whether the kernel keeps the largest impulses of points.
-    pub fn keeps_peaks(self) -> bool {
+    pub fn keeps_bounces(self) -> bool {
         match self {
             Self::SolveContacts(rules) => rules.bounces,
             _ => matches!(self, Self::ApplyRestitution(_)),
@@ -199,11 +199,16 @@ impl Kernel {
     }
 
     /// Whether the kernel reads the approach velocities or the slips of points.
-    pub fn reads_approach_or_slip(self) -> bool {
+    pub fn reads_pull_or_slip(self) -> bool {
         match self {
             Self::SolveContacts(rules) => rules.patch || rules.driven || rules.friction == FrictionRule::Slip,
             _ => matches!(self, Self::ApplyRestitution(_)),
         }
+    }
+
+    /// Whether the kernel over constraints changes the places of bodies.
+    pub fn moves_bodies(self) -> bool {
+        matches!(self, Self::ApplyRestitution(_))
     }
 
     /// Whether the kernel is skipped when sweeps are no longer needed.

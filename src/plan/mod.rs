@@ -79,7 +79,7 @@ pub(crate) struct PlanKey {
     /// stiffness inertia in each step.
     isotropic: Vec<bool>,
     /// See [`StepProblem::parts`].
-    parts: [bool; 6],
+    parts: [bool; 7],
 }
 
 crate::saved::cloned!(PlanKey { colors, blocks, isotropic, parts });
@@ -133,25 +133,19 @@ impl StepPlan {
             biased: false,
             from_start: false,
             isotropic: false,
-            bounces: contacts.restitution,
+            bounces: problem.params.bounces != 0,
             axes: !problem.axes.is_empty(),
         };
         let mut plan = Self::default();
         for (block, isotropic) in (0..).zip(isotropic(problem)) {
             let own = &problem.blocks[block as usize];
-            let [contact_colors, _, bodies, ..] = own.colors();
+            let [_, _, bodies, ..] = own.colors();
             let from_start = own.substep.length < LONGEST_FROM_START && !problem.rows_of(&bodies).is_empty();
             let rules = Rules { from_start, isotropic, ..rules };
             if from_start {
                 plan.over_colors(Kernel::BeginChanges, block, std::slice::from_ref(&bodies));
             }
             plan.substeps(config, problem, block, rules);
-            if rules.bounces {
-                let rules = Rules { patch: rules.patch, from_start, isotropic, ..Rules::default() };
-                let groups = color_groups(&problem.colors, contact_colors, config.fuse_colors_below);
-                plan.over_colors(Kernel::ApplyRestitution(rules), block, &groups);
-            }
-            plan.sum_impulses(problem, block, own.substeps - 1);
             if from_start {
                 plan.over_colors(Kernel::EndChanges, block, &[bodies]);
             }
@@ -159,8 +153,8 @@ impl StepPlan {
         plan
     }
 
-    /// The substeps of a block. Each has velocities, warm start, biased sweeps, positions, relax sweeps, and sums of
-    /// impulses. In the last substep, the sums come after restitution.
+    /// The substeps of a block. Each has velocities, warm start, restitution, biased sweeps, positions, relax sweeps, and
+    /// sums of impulses.
     fn substeps(&mut self, config: &SolverConfig, problem: &StepProblem, block: u32, shared: Rules) {
         let own = &problem.blocks[block as usize];
         let (substeps, from_start) = (own.substeps, shared.from_start);
@@ -216,15 +210,16 @@ impl StepPlan {
             } else if !contact_colors.is_empty() {
                 self.passes.push(Pass { kernel: Kernel::ClearImpulses, block, colors: contact_colors.clone() });
             }
+            if shared.bounces {
+                self.over_colors(Kernel::ApplyRestitution(shared.of_restitution()), block, &contacts);
+            }
             self.sweeps(sweeps(config.iterations), biased);
             self.over_colors(Kernel::IntegratePositions { from_start }, block, bodies);
             self.over_colors(Kernel::IntegrateGyroscopic { from_start }, block, inertias);
             self.over_colors(Kernel::TurnInertias, block, turning);
             self.over_colors(Kernel::BeginSystems, block, systems);
             self.sweeps(sweeps(config.relax), shared);
-            if substep + 1 < substeps {
-                self.sum_impulses(problem, block, substep);
-            }
+            self.sum_impulses(problem, block, substep);
         }
     }
 

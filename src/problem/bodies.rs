@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
 use super::damping::Decay;
-use super::rows::{BodyRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params, TorqueRow};
+use super::rows::{BodyRow, ContactRow, ConvergenceRow, InertiaRow, MassRow, MomentumRow, Params, TorqueRow};
 use super::{Block, StepProblem};
 use crate::config::{SolverConfig, Stabilization};
 use crate::constants::MAX_ROUNDINGS;
@@ -109,8 +109,15 @@ pub(crate) fn pose_after(body: &Body, row: &BodyRow) -> (Vec3, Quat) {
 
 /// Puts the bodies on which no constraint has acted onto their exact paths. A substep h moves a body by its velocity at
 /// the end, so a step in which the velocity changes by u moves it by u h/2 too far. With the mean of both velocities a
-/// body falls along its parabola, to rounding. Bodies that are `jointed` keep the paths of the substeps.
-pub fn follow_parabolas(world: &World, effort: &Effort, jointed: &[bool], dt: f32, problem: &mut StepProblem) {
+/// body falls along its parabola, to rounding. So does a body on which only impacts act: those that a surface threw
+/// are `thrown`. Bodies that are `jointed` keep the paths of the substeps.
+pub fn follow_parabolas(
+    world: &World,
+    effort: &Effort,
+    [jointed, thrown]: [&[bool]; 2],
+    dt: f32,
+    problem: &mut StepProblem,
+) {
     let StepProblem { bodies, masses, blocks, .. } = problem;
     let rows = bodies.par_iter_mut().zip(&*masses).zip(world.bodies.par_iter()).enumerate().with_min_len(MIN_BODIES);
     rows.for_each(|(i, ((row, mass), body))| {
@@ -126,6 +133,9 @@ pub fn follow_parabolas(world: &World, effort: &Effort, jointed: &[bool], dt: f3
         // The impulses of the step before, with which a step begins, round the velocities as well.
         let roundings = 4.0 * (*substeps as f32).min(MAX_ROUNDINGS as f32);
         if v.distance(free) > roundings * f32::EPSILON * v.length().max(v_0.length()) {
+            if thrown.get(i) == Some(&true) {
+                row.dp = (Vec3::from_array(row.dp) - half * (free - v_0)).to_array();
+            }
             return;
         }
         let turn = w - body.allowed_spin(body.angular_velocity);
@@ -136,6 +146,31 @@ pub fn follow_parabolas(world: &World, effort: &Effort, jointed: &[bool], dt: f3
             row.dq = renormalized(quat_mul(back, math::Quat::load(row.dq))).store();
         }
     });
+}
+
+/// Finds the bodies that a surface with restitution may have thrown, and that no contact presses at the end of the step;
+/// none if no surface bounces.
+pub fn find_thrown(problem: &StepProblem, thrown: &mut Vec<bool>) {
+    thrown.clear();
+    if problem.params.bounces == 0 {
+        return;
+    }
+    let contacts = problem.swept_contacts();
+    let mut mark = |contact: &ContactRow, is_thrown: bool| {
+        thrown.resize(problem.bodies.len(), false);
+        [contact.body_a, contact.body_b].iter().for_each(|&body| thrown[body as usize] = is_thrown);
+    };
+    contacts.clone().filter(|contact| contact.restitution > 0.0).for_each(|contact| mark(contact, true));
+    if thrown.is_empty() {
+        return;
+    }
+    for contact in contacts {
+        let first = contact.first_point as usize;
+        let own = &problem.impulses[first..first + contact.point_count as usize];
+        if own.iter().any(|impulse| impulse.normal > 0.0) {
+            [contact.body_a, contact.body_b].iter().for_each(|&body| thrown[body as usize] = false);
+        }
+    }
 }
 
 /// Writes poses and velocities into the world, except for bodies that are asleep. Impulses stay in their rows for the

@@ -477,7 +477,8 @@ impl ContactRows {
         };
         writer.write(&slots.all, SlotRows { contacts, points, impulses, computed, sags, jams });
         slots.all.iter_mut().for_each(|slot| slot.write = Write::Separations);
-        self.impacts.note(&self.slots.all, world, config.restitution_threshold, may_jam, problem);
+        let any_fast = self.impacts.note(&self.slots.all, world, [config.restitution_threshold, dt], may_jam, problem);
+        problem.params.bounces = (bounce && any_fast).into();
     }
 
     /// Makes room for the rows of all slots. If friction moves between points and manifolds, friction begins without

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::StepProblem;
-use super::rows::{BodyRow, ContactRow};
+use super::rows::{BodyRow, ContactRow, MassRow};
 use super::slots::Slot;
 use crate::graph::Islands;
 use crate::world::{Body, BodyKind, Joint, World};
@@ -16,7 +16,7 @@ pub struct Impacts {
     /// Whether a joint holds each dynamic body; empty without joints, and while no body is fast and no contact
     /// may jam.
     jointed: Vec<bool>,
-    /// Whether any part of each body may be faster than half the threshold of restitution.
+    /// Whether any part of each body may be faster than half the threshold of restitution in the step.
     fast: Vec<bool>,
     /// The islands of dynamic bodies that touch.
     islands: Islands,
@@ -42,27 +42,36 @@ impl Impacts {
     }
 
     /// Marks as struck the contacts of several points in islands where surfaces meet, on average, faster than `threshold`
-    /// (m/s). Joints are noted if any body is fast or any contact `may_jam`.
-    pub(super) fn note(&mut self, slots: &[Slot], world: &World, threshold: f32, may_jam: bool, problem: &StepProblem) {
-        let is_fast = |(row, body): (&BodyRow, &Body)| {
+    /// (m/s). Joints are noted if any body is fast or any contact `may_jam`. Returns whether surfaces may meet faster than
+    /// that within the next `dt` seconds.
+    pub(super) fn note(
+        &mut self,
+        slots: &[Slot],
+        world: &World,
+        [threshold, dt]: [f32; 2],
+        may_jam: bool,
+        problem: &StepProblem,
+    ) -> bool {
+        let is_fast = |((row, mass), body): ((&BodyRow, &MassRow), &Body)| {
             let [v, w] = [row.v, row.w].map(Vec3::from);
             // No point of a solid is much farther out than three radii of gyration. A driven body may have no mass.
             let reach = || 9.0 * body.mass.principal_inertia.max_element() / body.mass.mass.max(f32::MIN_POSITIVE);
-            let is_above = |half_square: f32| 8.0 * half_square > threshold * threshold;
-            is_above(v.length_squared())
-                || w != Vec3::ZERO && is_above(v.length_squared() + reach() * w.length_squared())
+            let speed = v.length() + dt * Vec3::from(mass.acceleration).length();
+            let is_above = |square: f32| 8.0 * square > threshold * threshold;
+            is_above(speed * speed)
+                || w != Vec3::ZERO && is_above(speed * speed + reach() * w.length_squared())
                 || body.kind == BodyKind::Kinematic && body.is_driven()
         };
         self.struck.clear();
         self.fast.clear();
-        self.fast.extend(problem.bodies.iter().zip(&world.bodies).map(is_fast));
+        self.fast.extend(problem.bodies.iter().zip(&problem.masses).zip(&world.bodies).map(is_fast));
         let any_fast = self.fast.contains(&true);
         self.jointed.clear();
         if any_fast || may_jam {
             self.note_joints(world);
         }
         if !any_fast {
-            return;
+            return false;
         }
         let meets = |(slot, contact): (&Slot, &ContactRow)| {
             let is_fast = || [contact.body_a, contact.body_b].iter().any(|&body| self.fast[body as usize]);
@@ -75,6 +84,7 @@ impl Impacts {
         if !self.struck.contains(&true) {
             self.struck.clear();
         }
+        true
     }
 
     fn note_joints(&mut self, world: &World) {

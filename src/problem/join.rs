@@ -15,10 +15,9 @@ use crate::config::{Method, SolverConfig};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Alike {
     friction: bool,
-    restitution: bool,
     round: bool,
     /// See [`StepProblem::parts`].
-    parts: [bool; 6],
+    parts: [bool; 7],
     /// With all counts zero.
     params: Params,
 }
@@ -29,16 +28,14 @@ impl Alike {
         if config.tolerance > 0.0 || config.method != Method::Plain {
             return None;
         }
-        let (mut friction, mut restitution, mut round) = (false, false, false);
+        let (mut friction, mut round) = (false, false);
         for &row in problem.rows_of(&problem.contact_colors()) {
             let contact = &problem.contacts[row as usize];
             friction |= contact.friction > 0.0;
-            restitution |= contact.restitution > 0.0;
             round |= contact.radius_a > 0.0 || contact.radius_b > 0.0;
         }
         Some(Self {
             friction,
-            restitution,
             round,
             parts: problem.parts(),
             params: Params { body_count: 0, point_count: 0, joint_count: 0, axis_count: 0, ..problem.params },

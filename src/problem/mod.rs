@@ -30,7 +30,7 @@ pub use arithmetic::{Mass, Sym3};
 pub(crate) use axes::{drive_count, stiffness};
 pub use blocks::{Block, lay_out};
 pub(crate) use bodies::pose_after;
-pub use bodies::{begin, follow_parabolas, store};
+pub use bodies::{begin, find_thrown, follow_parabolas, store};
 pub use contacts::{ContactRows, check_material};
 pub use damping::write_dampings;
 pub use joint_systems::{BlockRow, ImpulseNumber, JointSystems, NodeRow};
@@ -144,7 +144,8 @@ crate::saved::cloned!(StepProblem {
 // The state that the next step continues from, without the rows of contacts ([`ContactRows::walk`]). The step writes
 // all other fields anew.
 crate::saved::fields!(Params { patches, rolls, driven } scratch {
-    restitution_threshold, slop, relaxation, tolerance, body_count, point_count, joint_count, axis_count, zero
+    restitution_threshold, slop, relaxation, tolerance, body_count, point_count, joint_count, axis_count, zero,
+    bounces
 });
 crate::saved::fields!(StepProblem { params, joint_impulses, systems } scratch {
     bodies, masses, torques, dampings, inertias, contacts, points, impulses, totals, sags, joints, axes, joint_totals,
@@ -244,9 +245,9 @@ impl StepProblem {
         self.axes.iter().any(|axis| !axis.is_lock())
     }
 
-    /// Whether there are torques, damping, sums of impulses, sums of impulses of joints, axes of joints, and axes that
-    /// are limits or drives.
-    pub(crate) fn parts(&self) -> [bool; 6] {
+    /// Whether there are torques, damping, sums of impulses, sums of impulses of joints, axes of joints, axes that are
+    /// limits or drives, and surfaces that may bounce.
+    pub(crate) fn parts(&self) -> [bool; 7] {
         [
             !self.torques.is_empty(),
             !self.dampings.is_empty(),
@@ -254,6 +255,7 @@ impl StepProblem {
             !self.joint_totals.is_empty(),
             !self.axes.is_empty(),
             self.has_swept_axes(),
+            self.params.bounces != 0,
         ]
     }
 

@@ -252,7 +252,7 @@ impl PrepareSlots<'_> {
                 self.rows.sags.write(slot, sag.0[lane]);
                 let own = self.rows.impulses.slice(slot * self.rows.stride..(slot + 1) * self.rows.stride);
                 if self.rows.preload.warm_start != 0 {
-                    own.iter_mut().for_each(|impulse| impulse.peak = 0.0);
+                    own.iter_mut().for_each(|impulse| impulse.bounce = 0.0);
                 } else {
                     own.fill(ImpulseRow::default());
                 }
@@ -359,7 +359,7 @@ mod tests {
         let computed = computed.collect();
         let point = |_| PointRow { r_a: vector(), r_b: vector(), normal_mass: 1.0, ..PointRow::default() };
         let points = (0..SLOTS * STRIDE).map(point).collect();
-        let impulse = |_| ImpulseRow { normal: vector()[0].abs(), tangent_1: 0.5, tangent_2: 0.1, peak: 2.0 };
+        let impulse = |_| ImpulseRow { normal: vector()[0].abs(), tangent_1: 0.5, tangent_2: 0.1, bounce: 2.0 };
         let impulses = (0..SLOTS * STRIDE).map(impulse).collect();
         let (sags, jams) = (vec![0.0; SLOTS], vec![false; SLOTS]);
         Tables { masses, poses, contacts, points, impulses, computed, sags, jams }
@@ -416,7 +416,7 @@ mod tests {
             let yields = PRELOAD.yielding(contact.substep_share, both, pressed);
             contact.preload = preloaded(&PRELOAD, contact.preload, yields * reciprocal(mass));
             tables.sags[i] = yields * (a.inv_mass + b.inv_mass);
-            tables.impulses[i * STRIDE..(i + 1) * STRIDE].iter_mut().for_each(|impulse| impulse.peak = 0.0);
+            tables.impulses[i * STRIDE..(i + 1) * STRIDE].iter_mut().for_each(|impulse| impulse.bounce = 0.0);
         }
     }
 

@@ -102,13 +102,13 @@ mod tests {
         let mut contact =
             ContactRow { preload: 0.25, substep_share: 1.0, point_count: 1, ..ContactRow::framed(glam::Vec3::Y) };
         let points = [PointRow { separation: -0.25, ..PointRow::default() }];
-        let mut impulses = [ImpulseRow { normal: 8.0, tangent_1: 4.0, tangent_2: -2.0, peak: 1.0 }];
+        let mut impulses = [ImpulseRow { normal: 8.0, tangent_1: 4.0, tangent_2: -2.0, bounce: 1.0 }];
         change_share(&mut contact, 0.5, 0.5, &points, &mut impulses);
         assert_eq!((contact.substep_share, contact.preload), (0.5, -0.125));
-        assert_eq!(impulses, [ImpulseRow { normal: 4.0, tangent_1: 2.0, tangent_2: -1.0, peak: 1.0 }]);
+        assert_eq!(impulses, [ImpulseRow { normal: 4.0, tangent_1: 2.0, tangent_2: -1.0, bounce: 1.0 }]);
         change_share(&mut contact, 1.0, 0.125, &points, &mut impulses);
         assert_eq!((contact.substep_share, contact.preload), (1.0, 0.25));
-        assert_eq!(impulses, [ImpulseRow { normal: 8.0, tangent_1: 4.0, tangent_2: -2.0, peak: 1.0 }]);
+        assert_eq!(impulses, [ImpulseRow { normal: 8.0, tangent_1: 4.0, tangent_2: -2.0, bounce: 1.0 }]);
     }
 
     /// A contact without a load that is 0.25 m deep is pushed out as before. Under a load, the overlap counts up to

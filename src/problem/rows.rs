@@ -24,8 +24,8 @@ pub struct BodyRow {
     pub pad_w: f32,
     /// Movement of the center of mass since the step began (m).
     pub dp: [f32; 3],
-    #[doc(hidden)]
-    pub pad_dp: f32,
+    /// Time since the step began (s).
+    pub time: f32,
     /// Rotation since the step began, x y z w.
     pub dq: [f32; 4],
 }
@@ -33,7 +33,7 @@ pub struct BodyRow {
 impl BodyRow {
     /// A body that does not move.
     pub const AT_REST: Self =
-        Self { v: [0.0; 3], pad_v: 0.0, w: [0.0; 3], pad_w: 0.0, dp: [0.0; 3], pad_dp: 0.0, dq: [0.0, 0.0, 0.0, 1.0] };
+        Self { v: [0.0; 3], pad_v: 0.0, w: [0.0; 3], pad_w: 0.0, dp: [0.0; 3], time: 0.0, dq: [0.0, 0.0, 0.0, 1.0] };
 }
 
 /// Velocities of one body without the impulses of this substep, 32 B. A backend keeps them between passes. No step
@@ -202,8 +202,8 @@ pub struct PointRow {
     /// One over the largest eigenvalue of the tangential 2x2 block of G M⁻¹ Gᵀ; with one slip direction, one over the
     /// entry of this direction (kg).
     pub tangent_mass: f32,
-    /// Normal velocity when the surfaces meet, negative when approaching (m/s).
-    pub approach_velocity: f32,
+    /// Acceleration of b relative to a along the normal by gravity and forces (m/s²). 0 if no surface bounces.
+    pub pull: f32,
     /// Component of the slip direction along the first tangent. With friction per manifold, the distance from the patch
     /// (m). With driven surfaces, the velocity of b's surface relative to a's, beyond that of the bodies (m/s); with
     /// friction per manifold, only the patch has it. On a patch that resists rolling, the lever of spinning friction
@@ -213,7 +213,7 @@ pub struct PointRow {
     pub slip_2: f32,
 }
 
-crate::saved::fields!(PointRow { r_a, separation, r_b, normal_mass, tangent_mass, approach_velocity, slip_1, slip_2 });
+crate::saved::fields!(PointRow { r_a, separation, r_b, normal_mass, tangent_mass, pull, slip_1, slip_2 });
 
 /// The inverse inertia of a body of direct joints when the step begins, 32 B. It turns with the body.
 #[repr(C)]
@@ -368,11 +368,11 @@ pub struct ImpulseRow {
     pub tangent_1: f32,
     /// Along the second tangent, on b.
     pub tangent_2: f32,
-    /// Largest normal impulse in this step so far.
-    pub peak: f32,
+    /// Along the normal, on b, by the bounce of this substep.
+    pub bounce: f32,
 }
 
-crate::saved::fields!(ImpulseRow { normal, tangent_1, tangent_2, peak });
+crate::saved::fields!(ImpulseRow { normal, tangent_1, tangent_2, bounce });
 
 /// Coefficients of a soft contact over one substep, 16 B. Derivation: [`super::softness`].
 #[repr(C)]
@@ -401,7 +401,7 @@ impl Softness {
     }
 }
 
-/// Parameters for every body and contact of a step, 48 B.
+/// Parameters for every body and contact of a step, 52 B.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Params {
@@ -429,6 +429,8 @@ pub struct Params {
     pub rolls: u32,
     /// 1 if some surface moves by itself, as a belt does.
     pub driven: u32,
+    /// 1 if a surface with restitution may meet another one faster than the threshold.
+    pub bounces: u32,
 }
 
 /// The length of the substeps of a block, and the coefficients that follow from it, 56 B.

@@ -9,8 +9,6 @@ use super::{ContactRow, StepProblem};
 pub struct ContactSummary {
     /// Whether any contact has friction.
     pub friction: bool,
-    /// Whether any contact can bounce.
-    pub restitution: bool,
     /// Whether any contact has a round surface, whose radius is in its row.
     pub round: bool,
     /// Number of points before each color, then of all points.
@@ -25,11 +23,10 @@ impl ContactSummary {
         let mut all = Self { points: vec![0], ..Self::default() };
         for color in problem.contact_colors() {
             let rows = problem.rows_of(&(color..color + 1)).par_chunks(CONTACTS_A_TASK);
-            let (friction, restitution, round, points) = rows
+            let (friction, round, points) = rows
                 .map(|rows| rows.iter().map(|&row| of_contact(&problem.contacts[row as usize])).fold(NONE, and))
                 .reduce(|| NONE, and);
             all.friction |= friction;
-            all.restitution |= restitution;
             all.round |= round;
             all.points.push(all.points[all.points.len() - 1] + points);
         }
@@ -42,15 +39,15 @@ impl ContactSummary {
     }
 }
 
-/// Facts about some contacts: friction, restitution, round surfaces, number of points.
-type Of = (bool, bool, bool, usize);
+/// Facts about some contacts: friction, round surfaces, number of points.
+type Of = (bool, bool, usize);
 
-const NONE: Of = (false, false, false, 0);
+const NONE: Of = (false, false, 0);
 
 fn of_contact(c: &ContactRow) -> Of {
-    (c.friction > 0.0, c.restitution > 0.0, c.radius_a > 0.0 || c.radius_b > 0.0, c.point_count as usize)
+    (c.friction > 0.0, c.radius_a > 0.0 || c.radius_b > 0.0, c.point_count as usize)
 }
 
 fn and(x: Of, y: Of) -> Of {
-    (x.0 | y.0, x.1 | y.1, x.2 | y.2, x.3 + y.3)
+    (x.0 | y.0, x.1 | y.1, x.2 + y.2)
 }

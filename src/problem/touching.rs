@@ -5,7 +5,6 @@ use glam::Vec3;
 use super::StepProblem;
 use super::contacts::ContactRows;
 use super::rows::{ContactRow, ImpulseRow};
-use super::write::speed_at_impact;
 use crate::world::World;
 
 /// Two colliders of two bodies: the index of each body, and the index of the collider among those of the body.
@@ -108,4 +107,11 @@ fn approach(contact: &ContactRow, world: &World, problem: &StepProblem) -> Optio
     }
     let impulse = totals.iter().map(|total| total.normal).sum();
     fastest.map(|fastest| Approach { impulse, ..fastest })
+}
+
+/// Speed at which surfaces meet (m/s). `vn` is their normal velocity when the step begins, `pull` their relative
+/// acceleration along the normal, and `gap` the remaining distance.
+fn speed_at_impact(vn: f32, pull: f32, gap: f32) -> f32 {
+    let approach = vn.min(0.0);
+    (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt()
 }

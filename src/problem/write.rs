@@ -277,21 +277,17 @@ impl Writer<'_> {
         self.effort.share(if is_movable(row.body_a) { row.body_a } else { row.body_b } as usize)
     }
 
-    /// Writes the velocities of a point when the step begins: its approach velocity, and the slip direction if friction
-    /// has only one direction.
+    /// Writes the numbers of a point that the motion of its bodies decides when the step begins: their relative
+    /// acceleration, and the slip direction if friction has only one direction.
     fn approach(&self, row: &ContactRow, point: &mut PointRow) {
-        let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
-        let [a, b] = [row.body_a, row.body_b].map(|i| &self.bodies[i as usize]);
         let masses = [row.body_a, row.body_b].map(|i| &self.masses[i as usize]);
-        let velocity = |body: &BodyRow, r: Vec3| Vec3::from_array(body.v) + Vec3::from_array(body.w).cross(r);
-        let u = velocity(b, r_b) - velocity(a, r_a);
-        let normal = Vec3::from_array(row.normal);
         let [pull_a, pull_b] = masses.map(|m| Vec3::from_array(m.acceleration));
-        let pull = (pull_b - pull_a).dot(normal);
-        let vn = u.dot(normal);
-        let bounces = vn < 0.0 && row.restitution > 0.0;
-        point.approach_velocity = if bounces { -speed_at_impact(vn, pull, point.separation) } else { vn };
+        point.pull = if row.restitution > 0.0 { (pull_b - pull_a).dot(row.normal.into()) } else { 0.0 };
         if self.config.friction_rule() == FrictionRule::Slip && !self.layout.patches {
+            let (r_a, r_b) = (Vec3::from_array(point.r_a), Vec3::from_array(point.r_b));
+            let [a, b] = [row.body_a, row.body_b].map(|i| &self.bodies[i as usize]);
+            let velocity = |body: &BodyRow, r: Vec3| Vec3::from_array(body.v) + Vec3::from_array(body.w).cross(r);
+            let u = velocity(b, r_b) - velocity(a, r_a);
             let (tangent_1, tangent_2) = row.tangents();
             // A point that does not slip yet takes the first tangent.
             let slip = Vec2::new(u.dot(tangent_1), u.dot(tangent_2)).try_normalize().unwrap_or(Vec2::X);
@@ -318,14 +314,7 @@ fn retangented(before: &ContactRow, now: &ContactRow, impulse: &ImpulseRow) -> I
     let friction = if now.friction > 0.0 { friction } else { Vec3::ZERO };
     let (tangent_1, tangent_2) = now.tangents();
     let [tangent_1, tangent_2] = [tangent_1, tangent_2].map(|tangent| friction.dot(tangent));
-    ImpulseRow { normal: impulse.normal, tangent_1, tangent_2, peak: 0.0 }
-}
-
-/// Speed at which surfaces meet (m/s). `vn` is their normal velocity when the step begins, `pull` their relative
-/// acceleration along the normal, and `gap` the remaining distance.
-pub(super) fn speed_at_impact(vn: f32, pull: f32, gap: f32) -> f32 {
-    let approach = vn.min(0.0);
-    (approach * approach - 2.0 * (pull * gap).min(0.0)).sqrt()
+    ImpulseRow { normal: impulse.normal, tangent_1, tangent_2, bounce: 0.0 }
 }
 
 /// The row that resists the relative spin of two bodies.

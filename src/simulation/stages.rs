@@ -43,6 +43,8 @@ pub(super) struct Stages {
     pub by_body: ByBody,
     /// The key of the plan, or `None` if the next step has to build a plan.
     plan_key: Option<PlanKey>,
+    /// The bodies that a surface threw in the last step.
+    thrown: Vec<bool>,
     /// Number of active contact points, and bytes that the plan moves.
     points: usize,
     bytes_moved: u64,
@@ -72,6 +74,8 @@ crate::saved::cloned!(Stages {
     bytes_moved,
     astray,
     is_foreign,
+} scratch {
+    thrown,
 });
 
 /// The settings and body properties for which all rows were written. Only a change of this value updates the state.
@@ -154,6 +158,7 @@ impl Stages {
             events,
             by_body: _,
             plan_key: _,
+            thrown: _,
             points: _,
             bytes_moved: _,
             astray,
@@ -500,8 +505,9 @@ impl Stages {
     /// Stores poses and velocities in the world, and removes energy that constraints added.
     pub fn store(&mut self, world: &mut World, dt: f32) -> Taken {
         self.note_events(world);
-        let Self { energy, effort, key, problem, .. } = self;
-        problem::follow_parabolas(world, effort, energy.note_jointed(problem), dt, problem);
+        let Self { energy, effort, key, problem, thrown, .. } = self;
+        problem::find_thrown(problem, thrown);
+        problem::follow_parabolas(world, effort, [energy.note_jointed(problem), thrown], dt, problem);
         let taken = energy.hold(world, problem, effort, &key.config, dt);
         problem::store(&self.problem, self.sleep.asleep(), world);
         let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());

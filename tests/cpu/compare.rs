@@ -111,7 +111,7 @@ fn whatever_a_backend_gives_back_is_compared() {
     }
     let spoils: [fn(&mut StepProblem); 6] = [
         |problem| problem.bodies[3].dq[2] = problem.bodies[3].dq[2].next_up(),
-        |problem| problem.impulses[0].peak = problem.impulses[0].peak.next_up(),
+        |problem| problem.impulses[0].bounce = problem.impulses[0].bounce.next_up(),
         |problem| problem.joint_impulses[0].linear[1] = -0.0,
         |problem| problem.joint_totals[0].linear[1] = -0.0,
         |problem| problem.convergence.sweeps += 1,

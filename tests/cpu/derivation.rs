@@ -453,36 +453,56 @@ fn a_soft_sweep_takes_its_share_and_gives_its_impulse_back() {
         let contact = Contact { normal: lane(case.normal), ..Contact::default() };
         let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
         let point = Point { r_a, r_b, separation: -0.01, normal_mass: mass, ..Point::default() };
-        let mut impulses = [Impulse { normal: 0.1, peak: 0.3, ..Impulse::default() }];
+        let mut impulses = [Impulse { normal: 0.1, bounce: 0.3, ..Impulse::default() }];
         solve_contact(rules, &parting, &mut pair, &contact, &mut (&[point][..], &mut impulses[..]));
-        assert_eq!(impulses[0].peak, 0.3, "the largest so far stays");
+        assert_eq!(impulses[0].bounce, 0.3, "sweeps keep the bounce");
         impulses[0].normal
     };
     assert!(mass > 0.11, "{mass}");
     assert_eq!((pushed(true), pushed(false)), (0.0, 0.1));
 }
 
-#[test]
-fn a_bounce_gives_back_its_share_of_an_approach_above_the_threshold_that_a_contact_stopped() {
+/// Of the contact point: the relative velocity after a substep `h` with an impact, the separation at its end, and the
+/// impulse. `gap` and `start` are the separation and the velocity on the true path at the start of the substep, and
+/// `elapsed` is the time since the step began.
+fn bounced([gap, start, pull]: [f64; 3], [elapsed, h]: [f64; 2], restitution: f64) -> [f64; 3] {
     let case = case();
     let mass = 1.0 / case.dense(case.normal, case.normal);
-    let params = StepParams { restitution_threshold: 1.0, ..StepParams::default() };
-    let bounced = |approach_velocity: f64, peak: f64| {
-        let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
-        let contact = Contact { normal: lane(case.normal), restitution: 0.5, ..Contact::default() };
-        let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
-        let point = Point { r_a, r_b, normal_mass: mass, approach_velocity, ..Point::default() };
-        let mut impulses = [Impulse { normal: 0.1, peak, ..Impulse::default() }];
-        restitute_contact(Rules::default(), &params, &mut pair, &contact, &mut (&[point][..], &mut impulses[..]));
-        let u = relative_velocity(Rules::default(), &pair, r_a, r_b);
-        (DVec3::new(u.x, u.y, u.z).dot(case.normal), impulses[0])
-    };
-    let (u, impulse) = bounced(-3.0, 0.2);
-    assert!((u - 1.5).abs() < 1e-13 && (impulse.normal - 0.1 - 1.5 * mass).abs() < 1e-14, "{u} m/s");
-    assert_eq!(impulse.peak, impulse.normal.max(0.2));
-    // Too slow, and what no contact stopped.
-    assert_eq!(bounced(-0.99, 0.2).0, 0.0);
-    assert_eq!(bounced(-3.0, 0.0).0, 0.0);
+    let params = StepParams { substep: h, restitution_threshold: 1.0, ..StepParams::default() };
+    let mut pair = case.pair(0, DVec3::ZERO, DVec3::ZERO);
+    // Substeps move a free body too far by half a substep times the change of its velocity.
+    let ahead = 0.5 * pull * h;
+    (pair.a.time, pair.b.time) = (elapsed, elapsed);
+    pair.b.v = lane(case.normal * (start + pull * h));
+    let contact = Contact { normal: lane(case.normal), restitution, ..Contact::default() };
+    let (r_a, r_b) = (lane(case.r[0]), lane(case.r[1]));
+    let point = Point { r_a, r_b, separation: gap + ahead * elapsed, normal_mass: mass, pull, ..Point::default() };
+    let mut impulses = [Impulse { normal: 0.1, ..Impulse::default() }];
+    let rules = Rules::default();
+    restitute_contact(rules, &params, &mut pair, &contact, &mut (&[point][..], &mut impulses[..]));
+    assert_eq!(impulses[0].normal, 0.1, "a bounce is no part of the impulses that the next substep begins with");
+    let u = relative_velocity(rules, &pair, r_a, r_b);
+    let u = DVec3::new(u.x, u.y, u.z).dot(case.normal);
+    let s = current_separation(&normal_movement(rules, &pair, &contact), &contact, &point);
+    [u, s + u * h - ahead * (elapsed + h), impulses[0].bounce / mass]
+}
+
+#[test]
+fn a_bounce_acts_when_the_surfaces_meet_and_gives_back_its_share_of_their_speed() {
+    let (start, h, e) = (-3.0_f64, 1e-3, 0.5);
+    for (gap, pull, elapsed) in [(1e-3, 0.0, 0.0), (1e-3, -400.0, 0.0), (1e-3, -400.0, 0.01), (2e-3, 300.0, 0.002)] {
+        let speed = (start * start - 2.0 * pull * gap).sqrt();
+        let left = h - 2.0 * gap / (speed - start);
+        let [u, s, impulse] = bounced([gap, start, pull], [elapsed, h], e);
+        let expected = [e * speed + pull * left, e * speed * left + 0.5 * pull * left * left, (1.0 + e) * speed];
+        for (is, wanted) in [u, s, impulse].into_iter().zip(expected) {
+            assert!((is - wanted).abs() < 1e-5 * (1.0 + wanted.abs()).min(0.2), "{gap} {pull}: {is}, not {wanted}");
+        }
+    }
+    // Surfaces that do not meet in the substep, meet too slowly, or do not bounce.
+    for (state, e) in [([4e-3, start, 0.0], e), ([1e-4, -0.99, 0.0], e), ([1e-3, start, 0.0], 0.0)] {
+        assert_eq!(bounced(state, [0.0, h], e)[2], 0.0, "{state:?}");
+    }
 }
 
 /// M⁻¹ Gᵀ λ of the impulses that are carried over: of each point, or of the points and their patch.
@@ -490,8 +510,8 @@ fn a_bounce_gives_back_its_share_of_an_approach_above_the_threshold_that_a_conta
 fn a_warm_start_is_the_impulses_times_their_rows() {
     let s = slipping();
     let (case, [t_1, t_2]) = (case(), s.tangents);
-    let impulse = Impulse { normal: 0.3, tangent_1: 0.2, tangent_2: -0.1, peak: 0.0 };
-    let patch_impulse = Impulse { normal: -0.4, tangent_1: 0.05, tangent_2: 0.15, peak: 0.0 };
+    let impulse = Impulse { normal: 0.3, tangent_1: 0.2, tangent_2: -0.1, bounce: 0.0 };
+    let patch_impulse = Impulse { normal: -0.4, tangent_1: 0.05, tangent_2: 0.15, bounce: 0.0 };
     let friction = |i: Impulse<f64>| t_1 * i.tangent_1 + t_2 * i.tangent_2;
     for patch in [false, true] {
         let mut pair = s.pair;

@@ -210,3 +210,67 @@ fn cubes_bounce_off_each_other_face_to_face() {
         }
     }
 }
+
+/// The height of a ball above the floor after a fall from `height` at `t` (s), with restitution `e`: parabola after
+/// parabola.
+fn height_of_bouncing(height: f64, e: f64, t: f64) -> f64 {
+    const G: f64 = 9.81;
+    let mut left = t - (2.0 * height / G).sqrt();
+    if left < 0.0 {
+        return height - 0.5 * G * t * t;
+    }
+    let mut speed = e * (2.0 * G * height).sqrt();
+    while left > 2.0 * speed / G {
+        left -= 2.0 * speed / G;
+        speed *= e;
+    }
+    speed * left - 0.5 * G * left * left
+}
+
+/// Before: a ball waited at the floor until the end of each step with an impact.
+#[test]
+fn a_ball_that_bounces_is_on_its_parabola_at_every_time() {
+    for (rate, e) in [(30, 1.0), (60, 0.8), (60, 1.0), (240, 0.8)] {
+        let mut world = World::new();
+        world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).restitution(e));
+        let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).restitution(e).position(0.0, 2.5, 0.0));
+        let mut simulation = started(world);
+        for step in 1..=3 * rate {
+            simulation.step(1.0 / rate as f32).expect("a step");
+            let height = f64::from(simulation.world.bodies[ball].position.y) - 0.5;
+            let expected = height_of_bouncing(2.0, f64::from(e), f64::from(step) / f64::from(rate));
+            assert!((height - expected).abs() < 1e-3, "{rate} Hz, {e}: {height} m after step {step}, not {expected} m");
+        }
+    }
+}
+
+/// Balls in a row hand a blow on, whether they touch or not: each gets (1 + e)/2 of the velocity of the one before.
+#[test]
+fn a_row_of_balls_hands_a_blow_on_to_the_last() {
+    for (gap, rate, count, e) in [
+        (0.0, 60, 5, 1.0_f32),
+        (0.0, 30, 8, 1.0),
+        (1e-3, 60, 5, 1.0),
+        (0.01, 60, 5, 1.0),
+        (0.01, 240, 8, 1.0),
+        (0.01, 60, 5, 0.9),
+        (0.1, 30, 5, 0.8),
+    ] {
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        for i in 0..count {
+            let x = if i == 0 { -2.0 } else { i as f32 * (1.0 + gap) };
+            let ball = Body::dynamic().shape(Shape::ball(0.5)).friction(0.0).restitution(e).position(x, 0.0, 0.0);
+            world.insert(if i == 0 { ball.velocity(7.0 * Vec3::X, Vec3::ZERO) } else { ball });
+        }
+        let mut simulation = started(world);
+        (0..rate).for_each(|_| drop(simulation.step(1.0 / rate as f32).expect("a step")));
+        let speeds: Vec<f32> = simulation.world.bodies.iter().map(|ball| ball.linear_velocity.x).collect();
+        let expected = 7.0 * (0.5 * (1.0 + e)).powi(count - 1);
+        let last = speeds[count as usize - 1];
+        assert!((last - expected).abs() < 1e-3, "{gap} m, {rate} Hz, {e}: {speeds:?}, not {expected} m/s");
+        if e == 1.0 {
+            let others = speeds[..count as usize - 1].iter().all(|speed| speed.abs() < 1e-3);
+            assert!(others, "{gap} m, {rate} Hz: {speeds:?}");
+        }
+    }
+}

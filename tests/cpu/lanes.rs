@@ -111,21 +111,21 @@ fn friction_per_manifold_without_friction_has_the_same_bits() {
     }
 }
 
-/// No pass over a scene without restitution keeps the largest impulses.
+/// No pass over a scene without restitution keeps bounces.
 #[test]
-fn largest_impulses_that_no_pass_keeps_stay_in_the_rows() {
+fn bounces_that_no_pass_keeps_stay_in_the_rows() {
     let scene = Scene::find_spec("pile:n=50").unwrap();
     let mut simulation = Simulation::with(scene.world, SolverConfig::default().without_sleep(), best()).unwrap();
     for _ in 0..40 {
         simulation.step(scene.dt).unwrap();
     }
     let (mut problem, plan) = simulation.next_problem(scene.dt).unwrap();
-    assert!(problem.swept_contacts().count() > 0 && !plan.passes.iter().any(|pass| pass.kernel.keeps_peaks()));
-    problem.impulses.iter_mut().for_each(|impulse| impulse.peak = 0.5);
+    assert!(problem.swept_contacts().count() > 0 && !plan.passes.iter().any(|pass| pass.kernel.keeps_bounces()));
+    problem.impulses.iter_mut().for_each(|impulse| impulse.bounce = 0.5);
     for backend in each() {
         let mut solved = problem.clone();
         backend().run(&mut solved, &plan.passes).unwrap();
-        assert!(solved.impulses.iter().all(|impulse| impulse.peak == 0.5), "{}", backend().adapter());
+        assert!(solved.impulses.iter().all(|impulse| impulse.bounce == 0.5), "{}", backend().adapter());
     }
 }
 

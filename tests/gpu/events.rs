@@ -135,8 +135,7 @@ fn a_ball_that_bounces_begins_and_ends_with_every_bounce() {
         assert_eq!(events, [began(floor, ball), ended(floor, ball)].repeat(3));
         let begins: Vec<usize> = told.iter().step_by(2).map(|(step, _)| *step).collect();
         assert_eq!(begins, [60, 157, 235]);
-        // A step later the surfaces still overlap a little.
-        assert!(told.chunks(2).all(|bounce| bounce[1].0 == bounce[0].0 + 2), "{told:?}");
+        assert!(told.chunks(2).all(|bounce| bounce[1].0 == bounce[0].0 + 1), "{told:?}");
     }
 }
 
@@ -610,8 +609,8 @@ fn contacts_of_a_device_have_their_impulses_without_asking_it() {
     let of = |open: Open| {
         let mut simulation = simulation(&heap(), &SolverConfig::default().without_sleep(), open(), listen);
         run(&mut simulation, 60);
-        let body = simulation.world.bodies.handle(5).expect("a body");
-        let contacts: Vec<_> = simulation.contacts_of(body).collect();
+        let of_each = simulation.world.bodies.handles().skip(1).map(|body| simulation.contacts_of(body).collect());
+        let contacts: Vec<_> = of_each.max_by_key(Vec::len).expect("bodies");
         (contacts, simulation.contacts().map(|c| c.impulse.length()).sum::<f32>())
     };
     let (ours, theirs) = (of(reference), of(exact));

@@ -928,7 +928,6 @@ fn a_ball_on_a_thread_keeps_more_energy_than_in_rapier() {
 
 /// Rapier, newton_cradle3. Five balls keep 31 % of their energy for 20 s in Rapier.
 #[test]
-#[ignore = "20 % of the energy: hits that follow each other within a step lose energy"]
 fn a_cradle_of_five_keeps_as_much_energy_as_in_rapier() {
     let kept = cradle(5, 1200, |_| {});
     assert!((0.31..=1.0001).contains(&kept), "{kept} of the energy");
@@ -936,7 +935,6 @@ fn a_cradle_of_five_keeps_as_much_energy_as_in_rapier() {
 
 /// Rapier, newton_cradle3.
 #[test]
-#[ignore = "the first ball leaves at 3.9 of 7 m/s, others at up to 2.2: hits that follow each other within a step"]
 fn the_first_ball_of_a_cradle_flies_off_while_the_others_rest() {
     let mut best = (0.0, f32::INFINITY);
     cradle(5, 400, |speeds| {

@@ -173,7 +173,7 @@ pub fn scaled(mut problem: StepProblem, scale: f32) -> StepProblem {
     problem.masses.iter_mut().flat_map(|row| &mut row.acceleration).for_each(scale);
     problem.torques.iter_mut().flat_map(|row| &mut row.angular_acceleration).for_each(scale);
     problem.dampings.iter_mut().flat_map(|row| row.linear_gain.iter_mut().chain(&mut row.angular_gain)).for_each(scale);
-    problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.approach_velocity]).for_each(scale);
+    problem.points.iter_mut().flat_map(|row| [&mut row.separation, &mut row.pull]).for_each(scale);
     problem.joints.iter_mut().flat_map(|row| &mut row.gap).for_each(scale);
     problem.axes.iter_mut().flat_map(|row| [&mut row.gap, &mut row.speed, &mut row.max_impulse]).for_each(scale);
     problem.axes.iter_mut().filter(|row| row.left > NO_LIMIT).map(|row| &mut row.left).for_each(scale);
@@ -231,6 +231,7 @@ fn substep() -> Substep {
 fn params(problem: &StepProblem, patches: bool) -> Params {
     let mut params = Params::default();
     params.restitution_threshold = 1.0;
+    params.bounces = problem.contacts.iter().any(|contact| contact.restitution > 0.0).into();
     params.body_count = problem.bodies.len() as u32;
     params.point_count = problem.points.len() as u32;
     params.joint_count = problem.joints.len() as u32;
@@ -334,7 +335,7 @@ fn point_row(random: &mut Random, patches: bool) -> PointRow {
         r_b: random.vector(1.0).to_array(),
         normal_mass: random.within(0.1, 0.5),
         tangent_mass: random.within(0.1, 0.5),
-        approach_velocity: random.within(-3.0, 1.0),
+        pull: random.within(-10.0, 10.0),
         slip_1,
         slip_2,
     }
@@ -345,7 +346,7 @@ fn impulse_row(random: &mut Random, patch: bool) -> ImpulseRow {
     let least = if patch { -2.0 } else { 0.0 };
     let normal = if random.happens(0.3) { 0.0 } else { random.within(least, 2.0) };
     let (tangent_1, tangent_2) = (random.within(-1.0, 1.0), random.within(-1.0, 1.0));
-    ImpulseRow { normal, tangent_1, tangent_2, peak: normal.max(0.0) }
+    ImpulseRow { normal, tangent_1, tangent_2, bounce: 0.0 }
 }
 
 fn joint_row(random: &mut Random, [body_a, body_b]: [u32; 2]) -> JointRow {

@@ -108,7 +108,7 @@ fn point(operator: &Operator, index: usize, hand: f64) -> Point<f64> {
         separation: contact.offset.x,
         normal_mass: 1.0 / w.x_axis.x,
         tangent_mass: tangent_mass(w.y_axis.y, w.z_axis.z, w.y_axis.z),
-        approach_velocity: 0.0,
+        pull: 0.0,
         slip_1: contact.offset.y,
         slip_2: contact.offset.z * hand,
     }

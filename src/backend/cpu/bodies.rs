@@ -11,7 +11,7 @@ use crate::kernels::integrate::{
 use crate::kernels::joint_system::turned_inertia;
 use crate::kernels::momentum::extrapolated;
 use crate::kernels::{Body, Damping, Free, Inertia, Mass, StepParams, Sym3};
-use crate::lanes::{Lanes, Row8, Shared, WIDTH, Work, lanes};
+use crate::lanes::{Lanes, Row8, Shared, WIDTH, Work, lanes, row_at};
 use crate::math::{Lane, Quat, Vec3, vec3};
 use crate::plan::Kernel;
 use crate::problem::{BodyRow, InertiaRow, Params, StepProblem, Substep, TorqueRow};
@@ -22,7 +22,7 @@ use crate::problem::{BodyRow, InertiaRow, Params, StepProblem, Substep, TorqueRo
 pub(super) struct State {
     /// v . w .
     pub velocity: Row8,
-    /// dp . dq
+    /// dp, time, dq
     pub movement: Row8,
     /// Inverse inertia xx xy xz, inverse mass, inverse inertia yy yz zz, locks.
     pub mass: Row8,
@@ -43,9 +43,9 @@ impl State {
 
 /// The body of a kernel from the numbers of a state.
 #[inline(always)]
-fn body<L>(velocity: [L; 8], [px, py, pz, _, qx, qy, qz, qw]: [L; 8]) -> Body<L> {
+fn body<L>(velocity: [L; 8], [px, py, pz, time, qx, qy, qz, qw]: [L; 8]) -> Body<L> {
     let Free { v, w } = free_body(velocity);
-    Body { v, w, dp: vec3(px, py, pz), dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
+    Body { v, w, dp: vec3(px, py, pz), time, dq: Quat { axis: vec3(qx, qy, qz), w: qw } }
 }
 
 /// Free velocities from the numbers of a row.
@@ -369,11 +369,23 @@ pub(super) unsafe fn wide_start<L: Lanes>(free: *const Row8, places: &[u32; WIDT
 /// # Safety
 /// Those of [`wide_body`], and `free` has a row for each state.
 #[inline(always)]
-unsafe fn wide_free<L: Lanes>(free: *const Row8, places: &[u32; WIDTH]) -> Free<L> {
-    const ROWS: u32 = (size_of::<State>() / size_of::<Row8>()) as u32;
+pub(super) unsafe fn wide_free<L: Lanes>(free: *const Row8, places: &[u32; WIDTH]) -> Free<L> {
     // SAFETY: the caller's promise.
-    free_body(unsafe { L::gathered(free, &lanes!(lane => places[lane] / ROWS)) })
+    free_body(unsafe { L::gathered(free, &lanes!(lane => places[lane] / ROWS_A_STATE)) })
 }
+
+/// The row of `free` of the body whose state has this place.
+///
+/// # Safety
+/// `free` has a row for each state.
+#[inline(always)]
+pub(super) unsafe fn free_row(free: *mut Row8, place: u32) -> *mut Row8 {
+    // SAFETY: the caller's promise.
+    unsafe { row_at(free.cast_const(), place / ROWS_A_STATE).cast_mut() }
+}
+
+/// Number of rows that a state takes.
+const ROWS_A_STATE: u32 = (size_of::<State>() / size_of::<Row8>()) as u32;
 
 #[inline(always)]
 pub(super) fn velocity_rows<L: Lanes>(v: Vec3<L>, w: Vec3<L>) -> [Row8; WIDTH] {
@@ -381,7 +393,7 @@ pub(super) fn velocity_rows<L: Lanes>(v: Vec3<L>, w: Vec3<L>) -> [Row8; WIDTH] {
 }
 
 #[inline(always)]
-fn movement_rows<L: Lanes>(body: &Body<L>) -> [Row8; WIDTH] {
+pub(super) fn movement_rows<L: Lanes>(body: &Body<L>) -> [Row8; WIDTH] {
     L::scattered(movement_numbers(body))
 }
 
@@ -389,5 +401,5 @@ fn movement_rows<L: Lanes>(body: &Body<L>) -> [Row8; WIDTH] {
 #[inline(always)]
 fn movement_numbers<L: Lane>(body: &Body<L>) -> [L; 8] {
     let (p, q) = (body.dp, body.dq);
-    [p.x, p.y, p.z, L::constant(0.0), q.axis.x, q.axis.y, q.axis.z, q.w]
+    [p.x, p.y, p.z, body.time, q.axis.x, q.axis.y, q.axis.z, q.w]
 }

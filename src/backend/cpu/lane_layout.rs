@@ -29,9 +29,9 @@ pub(super) struct ImpulsePlace {
 #[derive(Clone, Copy)]
 pub(super) struct Uses {
     /// Largest impulses of points.
-    pub peaks: bool,
+    pub bounces: bool,
     /// Approach velocities and slips of points.
-    pub approach_or_slip: bool,
+    pub pull_or_slip: bool,
 }
 
 /// The contacts, or the joints, of a problem, part by part and color by color.
@@ -62,8 +62,8 @@ impl<C: Constraint> LaneLayout<C> {
     ) {
         self.make_groups(problem, partition, threads);
         let count = self.groups.last().map_or(0, |group| group.impulses().end);
-        points.resize(if C::are_with_points(problem) { count } else { 0 }, uses.approach_or_slip);
-        impulses.resize(count, uses.peaks);
+        points.resize(if C::are_with_points(problem) { count } else { 0 }, uses.pull_or_slip);
+        impulses.resize(count, uses.bounces);
         let len = self.groups.len();
         let work = Load::<C> {
             problem,

@@ -40,7 +40,7 @@ pub(super) struct LaneImpulses {
     /// Along both tangents.
     pub tangents: Vec<[Wide; 2]>,
     /// The largest normal impulses; empty if no pass keeps them.
-    pub peaks: Vec<Wide>,
+    pub bounces: Vec<Wide>,
 }
 
 impl LanePoints {
@@ -66,22 +66,22 @@ impl LanePoints {
 }
 
 impl LaneImpulses {
-    pub fn resize(&mut self, count: usize, has_peaks: bool) {
+    pub fn resize(&mut self, count: usize, has_bounces: bool) {
         self.normals.resize(count, Default::default());
         self.tangents.resize(count, Default::default());
-        self.peaks.resize(if has_peaks { count } else { 0 }, Default::default());
+        self.bounces.resize(if has_bounces { count } else { 0 }, Default::default());
     }
 
     pub fn shared(&mut self) -> SharedImpulses<'_> {
-        let Self { normals, tangents, peaks } = self;
-        SharedImpulses { normals: Shared::new(normals), tangents: Shared::new(tangents), peaks: Shared::new(peaks) }
+        let Self { normals, tangents, bounces } = self;
+        SharedImpulses { normals: Shared::new(normals), tangents: Shared::new(tangents), bounces: Shared::new(bounces) }
     }
 
     /// Normal impulse and friction, and the largest normal impulse or zero.
     #[inline(always)]
     pub fn numbers(&self, i: usize) -> [&Wide; 4] {
         let [one, two] = &self.tangents[i];
-        [&self.normals[i], one, two, if self.peaks.is_empty() { &ZERO } else { &self.peaks[i] }]
+        [&self.normals[i], one, two, if self.bounces.is_empty() { &ZERO } else { &self.bounces[i] }]
     }
 
     /// The three components of sixteen impulses.
@@ -110,7 +110,7 @@ pub(super) struct SharedPoints<'a> {
 pub(super) struct SharedImpulses<'a> {
     normals: Shared<'a, Wide>,
     tangents: Shared<'a, [Wide; 2]>,
-    peaks: Shared<'a, Wide>,
+    bounces: Shared<'a, Wide>,
 }
 
 impl<'a> SharedPoints<'a> {
@@ -141,7 +141,7 @@ impl<'a> SharedImpulses<'a> {
         // SAFETY: the caller's promise.
         unsafe {
             OwnImpulses {
-                peaks: self.peaks.slice(present(&self.peaks, &range)),
+                bounces: self.bounces.slice(present(&self.bounces, &range)),
                 normals: self.normals.slice(range.clone()),
                 tangents: self.tangents.slice(range),
             }
@@ -180,18 +180,18 @@ pub(super) struct OwnPoints<'a> {
 pub(super) struct OwnImpulses<'a> {
     pub normals: &'a mut [Wide],
     pub tangents: &'a mut [[Wide; 2]],
-    pub peaks: &'a mut [Wide],
+    pub bounces: &'a mut [Wide],
 }
 
 impl OwnPoints<'_> {
     /// Writes one lane of a point.
     pub fn set_lane(&mut self, k: usize, lane: usize, numbers: &[f32; 12]) {
-        let [arms @ .., tangent_mass, approach, slip_1, slip_2] = numbers;
+        let [arms @ .., tangent_mass, pull, slip_1, slip_2] = numbers;
         let arms: &[f32; 8] = arms;
         self.arms[k].iter_mut().zip(arms).for_each(|(wide, number)| wide.0[lane] = *number);
         self.tangent_masses[k].0[lane] = *tangent_mass;
         if let Some(others) = self.others.get_mut(k) {
-            others.iter_mut().zip([approach, slip_1, slip_2]).for_each(|(wide, number)| wide.0[lane] = *number);
+            others.iter_mut().zip([pull, slip_1, slip_2]).for_each(|(wide, number)| wide.0[lane] = *number);
         }
     }
 }
@@ -199,19 +199,19 @@ impl OwnPoints<'_> {
 impl OwnImpulses<'_> {
     /// Writes sixteen impulses.
     #[inline(always)]
-    pub fn set(&mut self, k: usize, [normal, tangent_1, tangent_2, peak]: [Wide; 4]) {
+    pub fn set(&mut self, k: usize, [normal, tangent_1, tangent_2, bounce]: [Wide; 4]) {
         (self.normals[k], self.tangents[k]) = (normal, [tangent_1, tangent_2]);
-        if let Some(own) = self.peaks.get_mut(k) {
-            *own = peak;
+        if let Some(own) = self.bounces.get_mut(k) {
+            *own = bounce;
         }
     }
 
     /// Writes one lane.
-    pub fn set_lane(&mut self, k: usize, lane: usize, [normal, tangent_1, tangent_2, peak]: &[f32; 4]) {
+    pub fn set_lane(&mut self, k: usize, lane: usize, [normal, tangent_1, tangent_2, bounce]: &[f32; 4]) {
         self.normals[k].0[lane] = *normal;
         [self.tangents[k][0].0[lane], self.tangents[k][1].0[lane]] = [*tangent_1, *tangent_2];
-        if let Some(own) = self.peaks.get_mut(k) {
-            own.0[lane] = *peak;
+        if let Some(own) = self.bounces.get_mut(k) {
+            own.0[lane] = *bounce;
         }
     }
 
@@ -231,11 +231,11 @@ impl OwnImpulses<'_> {
     #[inline(always)]
     pub fn impulse<L: Lanes>(&self, k: usize) -> Impulse<L> {
         let [tangent_1, tangent_2] = loaded!(&self.tangents[k]; 0 1);
-        let peak = match self.peaks.get(k) {
-            Some(peak) => L::load(peak),
+        let bounce = match self.bounces.get(k) {
+            Some(bounce) => L::load(bounce),
             None => L::constant(0.0),
         };
-        Impulse { normal: L::load(&self.normals[k]), tangent_1, tangent_2, peak }
+        Impulse { normal: L::load(&self.normals[k]), tangent_1, tangent_2, bounce }
     }
 }
 
@@ -253,7 +253,7 @@ impl<L: Lanes> PointRows<L> for GroupRows<'_> {
     #[inline(always)]
     fn point(&self, k: usize) -> Point<L> {
         let [ax, ay, az, separation, bx, by, bz, normal_mass] = loaded!(&self.points.arms[k]; 0 1 2 3 4 5 6 7);
-        let [approach_velocity, slip_1, slip_2] = match self.points.others.get(k) {
+        let [pull, slip_1, slip_2] = match self.points.others.get(k) {
             Some(others) => loaded!(others; 0 1 2),
             None => [L::constant(0.0); 3],
         };
@@ -263,7 +263,7 @@ impl<L: Lanes> PointRows<L> for GroupRows<'_> {
             r_b: vec3(bx, by, bz),
             normal_mass,
             tangent_mass: L::load(&self.points.tangent_masses[k]),
-            approach_velocity,
+            pull,
             slip_1,
             slip_2,
         }
@@ -281,8 +281,8 @@ impl<L: Lanes> PointRows<L> for GroupRows<'_> {
         self.impulses.tangents[k] = [tangent_1.store(), tangent_2.store()];
     }
     #[inline(always)]
-    fn set_peak(&mut self, k: usize, peak: L) {
-        self.impulses.peaks[k] = peak.store();
+    fn set_bounce(&mut self, k: usize, bounce: L) {
+        self.impulses.bounces[k] = bounce.store();
     }
 }
 

@@ -131,8 +131,7 @@ impl Cpu {
         }));
         let on = (self.instructions, threads);
         let is_any = |uses: fn(Kernel) -> bool| passes.iter().any(|pass| uses(pass.kernel));
-        let uses =
-            Uses { peaks: is_any(Kernel::keeps_peaks), approach_or_slip: is_any(Kernel::reads_approach_or_slip) };
+        let uses = Uses { bounces: is_any(Kernel::keeps_bounces), pull_or_slip: is_any(Kernel::reads_pull_or_slip) };
         let rows = (&mut self.contact_points, &mut self.contact_impulses);
         self.contacts.load(problem, &self.partition, &self.places, rows, uses, on);
         self.contact_totals.resize(0, false);
@@ -141,7 +140,7 @@ impl Cpu {
             self.contacts.load_sums(problem, totals, &mut self.contact_totals, threads);
         }
         // The last numbers of axes are stored in the places of those of points.
-        let uses = Uses { peaks: false, approach_or_slip: true };
+        let uses = Uses { bounces: false, pull_or_slip: true };
         let rows = (&mut self.joint_axes, &mut self.joint_impulses);
         self.joints.load(problem, &self.partition, &self.places, rows, uses, on);
         self.joint_totals.resize(0, false);

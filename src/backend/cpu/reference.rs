@@ -3,7 +3,7 @@
 use super::super::{Backend, CheckedStep};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use crate::error::Result;
-use crate::kernels::contact::{clear_impulse, sum_impulse, summed};
+use crate::kernels::contact::{clear_impulse, keep_bounces, sum_impulse, summed};
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{
     begin_changes, damp_velocities, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque,
@@ -11,7 +11,7 @@ use crate::kernels::integrate::{
 };
 use crate::kernels::joint_system::{JointFactors, SystemRows, begin_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
-use crate::kernels::{Axis, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Sym3};
+use crate::kernels::{Axis, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Rules, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, ImpulseNumber, JointRow, NodeRow, StepProblem};
@@ -197,6 +197,9 @@ impl<S: Scalar> Reference<S> {
                         &rows.contacts[i],
                         &mut own,
                     );
+                    if pass.kernel.moves_bodies() {
+                        self.store_bounces(rules, row.bodies(), &pair);
+                    }
                     self.store_pair(row.bodies(), &pair);
                 }
             }
@@ -263,6 +266,19 @@ impl<S: Scalar> Reference<S> {
         }
         if pair.moving > zero {
             self.convergence.moving = 1;
+        }
+    }
+
+    /// Stores the movements of a pair that may have bounced, and the bounces in the velocities without impulses.
+    fn store_bounces(&mut self, rules: Rules, [a, b]: [u32; 2], pair: &Pair<S>) {
+        for (i, body, mass) in [(a as usize, &pair.a, &pair.mass_a), (b as usize, &pair.b, &pair.mass_b)] {
+            if mass.inv_mass > S::constant(0.0) {
+                let row = &mut self.rows.bodies[i];
+                (row.dp, row.dq) = (body.dp, body.dq);
+                if !rules.from_start {
+                    keep_bounces(&Free { v: row.v, w: row.w }, body, &mut self.free[i]);
+                }
+            }
         }
     }
 }

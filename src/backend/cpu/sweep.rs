@@ -6,12 +6,12 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::bodies::{State, velocity_rows, wide_body, wide_mass, wide_start};
+use super::bodies::{State, free_row, movement_rows, velocity_rows, wide_body, wide_free, wide_mass, wide_start};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_group::{BodyLanes, LaneGroup};
 use super::lane_rows::{GroupRows, OwnImpulses, SharedImpulses, SharedPoints};
 use crate::config::FrictionRule;
-use crate::kernels::contact::sum_impulse;
+use crate::kernels::contact::{keep_bounces, sum_impulse};
 use crate::kernels::{Body, Contact, Free, Impulse, Pair, Rules, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
@@ -96,6 +96,10 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
         }
         // SAFETY: as above.
         unsafe {
+            if AS_ONE && kernel.moves_bodies() {
+                self.store_bounces(kernel, &group.a, &pair.a);
+                self.store_bounces(kernel, &group.b, &pair.b);
+            }
             store_velocities(states, &group.a, &pair.a);
             store_velocities(states, &group.b, &pair.b);
         }
@@ -103,12 +107,36 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
             self.moving.store(true, Ordering::Relaxed);
         }
     }
+
+    /// Stores the movements of bodies that may have bounced, and the bounces in the velocities without impulses. The
+    /// states still have the velocities before.
+    ///
+    /// # Safety
+    /// That of [`store_velocities`], and each state has a row of `free` that no other task uses meanwhile.
+    #[inline(always)]
+    unsafe fn store_bounces<L: Lanes>(&self, kernel: Kernel, bodies: &BodyLanes, body: &Body<L>) {
+        let BodyLanes { places, movable, .. } = *bodies;
+        let (states, rows) = (self.bodies.as_ptr(), self.free.as_ptr());
+        // SAFETY: the caller's promise.
+        let (before, mut free) = unsafe { (wide_body::<L>(states, &places), wide_free::<L>(rows, &places)) };
+        keep_bounces(&Free { v: before.v, w: before.w }, body, &mut free);
+        let (movements, velocities) = (movement_rows(body), velocity_rows(free.v, free.w));
+        for lane in (0..WIDTH).filter(|lane| movable & (1 << lane) != 0) {
+            // SAFETY: the caller's promise.
+            unsafe {
+                row_at((&raw mut (*states).movement).cast_const(), places[lane]).cast_mut().write(movements[lane]);
+                if !kernel.is_from_start() {
+                    free_row(rows, places[lane]).write(velocities[lane]);
+                }
+            }
+        }
+    }
 }
 
 /// Clears some impulses. Each task has its own.
 pub(super) fn clear_impulses(impulses: &SharedImpulses, range: Range<usize>) {
     // SAFETY: tasks have different parts, and `LaneLayout::impulses_of` gives each part impulses of its own.
-    let OwnImpulses { normals, tangents, peaks: _ } = unsafe { impulses.slice(range) };
+    let OwnImpulses { normals, tangents, bounces: _ } = unsafe { impulses.slice(range) };
     normals.fill(Wide::default());
     tangents.fill([Wide::default(); 2]);
 }
@@ -130,7 +158,7 @@ impl Work for Sums<'_> {
             let (now, mut total): (Impulse<L>, Impulse<L>) = (impulses.impulse(k), totals.impulse(k));
             sum_impulse(self.is_first, &now, &mut total);
             totals.set_components(k, total.components());
-            totals.peaks[k] = total.peak.store();
+            totals.bounces[k] = total.bounce.store();
         }
     }
 }

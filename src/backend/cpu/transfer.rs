@@ -181,7 +181,7 @@ impl<C: Constraint> Store<'_, C> {
     unsafe fn write(&self, i: usize, numbers: &[f32; 4]) {
         // SAFETY: the caller's promise.
         let to = unsafe { &mut self.to.slice(i..i + 1)[0] };
-        let count = if self.impulses.peaks.is_empty() { 3 } else { 4 };
+        let count = if self.impulses.bounces.is_empty() { 3 } else { 4 };
         to[..count].copy_from_slice(&numbers[..count]);
     }
 }

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use drystone::config::JointSolver;
-use drystone::{Body, Joint, Shape, SolverConfig, World};
+use drystone::{Body, Joint, Shape, SolverConfig, StepProblem, World};
 use glam::{Quat, Vec3};
 
 use super::{DT, ball, bounced, empty, floor, near, run, simulation};
@@ -68,17 +68,23 @@ fn a_ball_bounces_to_the_square_of_its_restitution() {
     }
 }
 
-/// A bounce asks for a push within its own step: a ball that lies still has one from the step before.
+/// Of sixteen balls that fall from different heights some bounce in the last substep of a step.
 #[test]
-fn what_was_pressed_in_the_step_before_does_not_bounce() {
+fn a_step_begins_without_the_bounces_of_the_step_before() {
     let mut world = World::new();
     world.insert(floor().restitution(0.5));
-    world.insert(ball().restitution(0.5).position(0.0, 0.5, 0.0));
+    for i in 0..16 {
+        world.insert(ball().restitution(0.5).position(3.0 * i as f32, 1.0 + 0.013 * i as f32, 0.0));
+    }
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
-    run(&mut simulation, 60, DT);
-    let problem = simulation.next_problem(DT).expect("a step").0;
-    let impulses: Vec<_> = problem.swept_contacts().map(|c| problem.impulses[c.first_point as usize]).collect();
-    assert!(impulses.len() == 1 && impulses[0].normal > 0.0 && impulses[0].peak == 0.0, "{impulses:?}");
+    let bounces = |problem: &StepProblem| problem.impulses.iter().filter(|impulse| impulse.bounce > 0.0).count();
+    let mut found = 0;
+    for _ in 0..60 {
+        simulation.step(DT).expect("a step");
+        found += bounces(simulation.problem());
+        assert_eq!(bounces(&simulation.next_problem(DT).expect("a step").0), 0);
+    }
+    assert!(found > 0);
 }
 
 /// A ball with its middle of mass 0.3 m off its origin. Hung there it does not turn, nor swing.

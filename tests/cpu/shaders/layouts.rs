@@ -66,7 +66,7 @@ const _: () = assert!(size_of::<FreeRow>() == SCRATCH_ROW && size_of::<ImpulseSt
 /// The layout of each row, under the name of its twin.
 fn in_rust() -> BTreeMap<String, Layout> {
     layouts! {
-        Body = BodyRow { v w dp dq }
+        Body = BodyRow { v w dp time dq }
         Free = FreeRow { v w }
         Mass = MassRow { inv_inertia_x inv_mass inv_inertia_yz locks acceleration }
         Torque = TorqueRow { angular_acceleration }
@@ -76,7 +76,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
             normal friction tangent restitution body_a body_b first_point point_count radius_a radius_b
             preload substep_share
         }
-        Point = PointRow { r_a separation r_b normal_mass tangent_mass approach_velocity slip_1 slip_2 }
+        Point = PointRow { r_a separation r_b normal_mass tangent_mass pull slip_1 slip_2 }
         Joint = JointRow { r_a body_a r_b body_b gap is_loose first_axis axis_count frame_a frame_b }
         Axis = AxisRow {
             direction coordinate gap left speed max_impulse rate mass_scale impulse_scale start
@@ -88,7 +88,7 @@ fn in_rust() -> BTreeMap<String, Layout> {
         Convergence = ConvergenceRow { moving done sweeps planned }
         ImpulseStep = ImpulseStep { before begin }
         Momentum = MomentumRow { t factor square restarts }
-        Impulse = ImpulseRow { normal tangent_1 tangent_2 peak }
+        Impulse = ImpulseRow { normal tangent_1 tangent_2 bounce }
         Softness = Softness { bias_rate mass_scale impulse_scale push_limit }
         Params = Params {
             restitution_threshold slop relaxation tolerance body_count point_count joint_count patches
@@ -145,7 +145,7 @@ fn a_changed_twin_is_found() {
     for (before, after, name) in [
         ("v: vec3f, w: vec3f", "w: vec3f, v: vec3f", "Body"),
         ("first_point: u32, point_count: u32", "point_count: u32, first_point: u32", "Contact"),
-        ("peak: f32 }", "peak: f32, more: f32 }", "Impulse"),
+        ("bounce: f32 }", "bounce: f32, more: f32 }", "Impulse"),
         ("push_limit: f32", "limit: f32", "Softness"),
         ("struct PassRow", "struct Row", "Row"),
     ] {
