@@ -9,7 +9,7 @@
 // the start of the substep. All are 0 if the point does not bounce.
 struct Impact { approach: f32, speed: f32, time: f32 }
 
-fn impact_at(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, movement: NormalMovement) -> Impact {
+fn impact_at(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, impulse: Impulse, movement: NormalMovement) -> Impact {
     let h = pass_row.substep;
     let s = current_separation(movement, contact, point);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
@@ -21,7 +21,7 @@ fn impact_at(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: P
     // Exact without acceleration.
     let speed = -start - (point.pull + point.pull) * gap * reciprocal(root - start);
     let time = larger((gap + gap) * reciprocal(speed - start), -h);
-    if -s > vn * h && will_bounce(contact, vn) && square > 0.0 { return Impact(vn, speed, time); }
+    if -s > vn * h && will_bounce(contact, vn, impulse) && square > 0.0 { return Impact(vn, speed, time); }
     return Impact(0.0, 0.0, 0.0);
 }
 
@@ -32,21 +32,30 @@ fn delayed(body: Body, before: Body, delay: f32) -> Body {
     return Body(body.v, body.w, dp, body.time, dq);
 }
 
-// Adds the change of a body's velocities to those without impulses, so that no later substep repeats it.
-fn keep_bounce(i: u32, mass: Mass, body: Body, before: Body) {
-    let v = body.v - before.v;
-    let w = body.w - before.w;
-    if mass.inv_mass > 0.0 && dot3(v, v) + dot3(w, w) > 0.0 {
-        free[i].v = free[i].v + v;
-        free[i].w = free[i].w + w;
-    }
+// The velocities of a movable body without the impulses of this substep, with which it strikes others. Those of a warm
+// start belong to the substep before.
+fn begin_bounces(is_from_start: bool, i: u32, mass: Mass, body: Body) -> Body {
+    if is_from_start || !(mass.inv_mass > 0.0) { return body; }
+    return Body(free[i].v, free[i].w, body.dp, body.time, body.dq);
 }
 
-// Stores the movement of a body that can move.
-fn store_movement(i: u32, mass: Mass, body: Body) {
-    if mass.inv_mass > 0.0 {
-        bodies[i].dp = body.dp;
-        bodies[i].dq = body.dq;
+// Stores the movement and the bounces of a body that can move, in its velocities with and without impulses.
+fn end_bounces(is_from_start: bool, i: u32, mass: Mass, body: Body) {
+    if !(mass.inv_mass > 0.0) { return; }
+    bodies[i].dp = body.dp;
+    bodies[i].dq = body.dq;
+    if is_from_start {
+        bodies[i].v = unlocked(mass.locks, body.v);
+        bodies[i].w = body.w;
+        return;
+    }
+    let v = body.v - free[i].v;
+    let w = body.w - free[i].w;
+    free[i].v = body.v;
+    free[i].w = body.w;
+    if dot3(v, v) + dot3(w, w) > 0.0 {
+        bodies[i].v = unlocked(mass.locks, bodies[i].v + v);
+        bodies[i].w = bodies[i].w + w;
     }
 }
 
@@ -54,14 +63,24 @@ fn restitute_contact(rules: Rules, i: u32) {
     let contact = contacts[i];
     let factor = 1.0 + contact.restitution;
     var pair = load_pair(contact.body_a, contact.body_b);
+    pair.a = begin_bounces(rules.from_start, contact.body_a, pair.mass_a, pair.a);
+    pair.b = begin_bounces(rules.from_start, contact.body_b, pair.mass_b, pair.b);
     let movement = normal_movement(rules, &pair, contact);
     let before_a = pair.a;
     let before_b = pair.b;
     var impacts: array<Impact, 4>;
+    var came_again: array<f32, 4>;
     var together = Together();
     for (var k = 0u; k < contact.point_count; k++) {
         let point = points[contact.first_point + k];
-        impacts[k] = impact_at(rules, &pair, contact, point, movement);
+        let impulse = impulses[contact.first_point + k];
+        impacts[k] = impact_at(rules, &pair, contact, point, impulse, movement);
+        came_again[k] = 0.0;
+        // A point that bounced in the substep before comes again.
+        if impulse.bounce > 0.0 && impacts[k].speed > 0.0 {
+            came_again[k] = -impacts[k].speed;
+            impacts[k] = Impact(0.0, 0.0, 0.0);
+        }
         let lacking = factor * impacts[k].speed;
         add_point(&together, k, point, Wanted(point.normal_mass * lacking, lacking));
     }
@@ -76,19 +95,16 @@ fn restitute_contact(rules: Rules, i: u32) {
         let own = point.normal_mass * (factor * left);
         apply_impulse(rules.isotropic, &pair, point.r_a, point.r_b, contact.normal * own);
         let bounce = share * together.changes[k] + own;
-        impulses[contact.first_point + k].bounce = bounce;
+        impulses[contact.first_point + k].bounce = bounce + came_again[k];
         all = all + bounce;
         delay = delay + bounce * impact.time;
     }
     if all > 0.0 {
         keep_locks(&pair);
         delay = delay * reciprocal(all);
-        store_movement(contact.body_a, pair.mass_a, delayed(pair.a, before_a, delay));
-        store_movement(contact.body_b, pair.mass_b, delayed(pair.b, before_b, delay));
-        if !rules.from_start {
-            keep_bounce(contact.body_a, pair.mass_a, pair.a, before_a);
-            keep_bounce(contact.body_b, pair.mass_b, pair.b, before_b);
-        }
+        pair.a = delayed(pair.a, before_a, delay);
+        pair.b = delayed(pair.b, before_b, delay);
     }
-    store_pair(contact.body_a, contact.body_b, &pair);
+    end_bounces(rules.from_start, contact.body_a, pair.mass_a, pair.a);
+    end_bounces(rules.from_start, contact.body_b, pair.mass_b, pair.b);
 }

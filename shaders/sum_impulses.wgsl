@@ -8,7 +8,7 @@ fn sum_contact(is_first: bool, i: u32) {
     for (var k = contact.first_point; k < end; k++) {
         let now = impulses[k];
         let before = totals[k];
-        let normal = now.normal + now.bounce;
+        let normal = now.normal + larger(now.bounce, 0.0);
         let sum = Impulse(before.normal + normal, before.tangent_1 + now.tangent_1, before.tangent_2 + now.tangent_2, 0.0);
         if is_first { totals[k] = Impulse(normal, now.tangent_1, now.tangent_2, 0.0); } else { totals[k] = sum; }
     }

@@ -32,7 +32,7 @@ fn clamp_normal(rules: Rules, sum: f32, correction: f32) -> f32 {
 }
 
 // The change of the normal impulse that a point needs by itself.
-fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: f32) -> f32 {
+fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: Impulse) -> f32 {
     let s = current_separation(movement, contact, point);
     // Surfaces apart may close the gap in this substep. Overlapping surfaces are pushed apart softly, or not at all in
     // a relax sweep.
@@ -43,18 +43,23 @@ fn normal_correction(rules: Rules, pair: ptr<function, Pair>, contact: Contact, 
     let impulse_scale = select(select(0.0, softness.impulse_scale, rules.biased), 0.0, apart);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
-    let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
+    let spring = -(mass * (vn + bias)) - impulse_scale * impulse.normal;
     // This limits the speed and not the force, so a contact at the limit still carries any load.
     let correction = select(spring, smaller(spring, -(mass * (vn - softness.push_limit))), rules.biased);
-    if rules.bounces && will_bounce(contact, vn) { return 0.0; }
+    // Sweeps leave a body that was struck to the next impact.
+    if rules.bounces && will_bounce(contact, vn, impulse) { return 0.0; }
     return params.relaxation * correction;
 }
 
-// Whether a point with this normal velocity bounces when it touches. Sweeps leave it to the next impact.
-fn will_bounce(contact: Contact, vn: f32) -> bool { return contact.restitution > 0.0 && -vn > params.restitution_threshold; }
+// Whether a point with this normal velocity bounces when it touches. A point that sweeps press has met its surface. One
+// that came again at once after it bounced is pressed from its other side, and sweeps stop it.
+fn will_bounce(contact: Contact, vn: f32, impulse: Impulse) -> bool {
+    let is_pressed = impulse.normal > 0.0 || impulse.bounce < 0.0;
+    return contact.restitution > 0.0 && !is_pressed && -vn > params.restitution_threshold;
+}
 
 fn solve_normal(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, softness: Softness, movement: NormalMovement, impulse: ptr<function, Impulse>) {
-    let correction = normal_correction(rules, pair, contact, point, softness, movement, (*impulse).normal);
+    let correction = normal_correction(rules, pair, contact, point, softness, movement, *impulse);
     let sum = clamp_normal(rules, (*impulse).normal, correction);
     let change = sum - (*impulse).normal;
     (*impulse).normal = sum;
@@ -67,7 +72,7 @@ struct Wanted { change: f32, lacking: f32 }
 
 // The normal impulse of a point in the substep, which limits friction.
 fn pressing(rules: Rules, impulse: Impulse) -> f32 {
-    if rules.bounces { return impulse.normal + impulse.bounce; }
+    if rules.bounces { return impulse.normal + larger(impulse.bounce, 0.0); }
     return impulse.normal;
 }
 
@@ -121,10 +126,10 @@ fn solve_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, softn
     var together = Together();
     for (var k = 0u; k < contact.point_count; k++) {
         let point = points[contact.first_point + k];
-        let impulse = impulses[contact.first_point + k].normal;
+        let impulse = impulses[contact.first_point + k];
         let correction = normal_correction(rules, pair, contact, point, softness, movement, impulse);
         let lacking = select(0.0, correction * reciprocal(point.normal_mass), point.normal_mass > 0.0);
-        add_point(&together, k, point, Wanted(clamp_normal(rules, impulse, correction) - impulse, lacking));
+        add_point(&together, k, point, Wanted(clamp_normal(rules, impulse.normal, correction) - impulse.normal, lacking));
     }
     let share = press_as_one(rules, pair, contact, &together);
     for (var k = 0u; k < contact.point_count; k++) {

@@ -7,7 +7,7 @@
 use super::Rules;
 use super::friction::{solve_friction, solve_rolling, solve_twist};
 use super::pair::{apply_angular_impulse, apply_impulse, keep_locks, note_correction, relative_velocity, spin_of};
-use super::rows::{Body, Contact, Free, Impulse, Pair, Point, SoftnessOf, StepParams};
+use super::rows::{Body, Contact, Free, Impulse, Mass, Pair, Point, SoftnessOf, StepParams};
 use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
 use crate::math::{
@@ -105,7 +105,7 @@ fn normal_correction<L: Lane>(
     pair: &Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
-    impulse: L,
+    impulse: &Impulse<L>,
 ) -> L {
     let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let s = current_separation(movement, contact, point);
@@ -118,17 +118,25 @@ fn normal_correction<L: Lane>(
     let impulse_scale = L::select(if rules.biased { softness.impulse_scale } else { zero }, zero, apart);
     let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
     let mass = point.normal_mass * mass_scale;
-    let spring = -(mass * (vn + bias)) - impulse_scale * impulse;
+    let spring = -(mass * (vn + bias)) - impulse_scale * impulse.normal;
     // This limits the speed and not the force, so a contact at the limit still carries any load.
     let correction = if rules.biased { smaller(spring, -(mass * (vn - softness.push_limit))) } else { spring };
     let correction = params.relaxation * correction;
-    if rules.bounces { L::select(correction, zero, will_bounce(params, contact, vn)) } else { correction }
+    if !rules.bounces {
+        return correction;
+    }
+    // Sweeps leave a body that was struck to the next impact.
+    L::select(correction, zero, will_bounce(params, contact, vn, impulse))
 }
 
-/// Whether a point with this normal velocity bounces when it touches. Sweeps leave it to the next impact.
+/// Whether a point with this normal velocity bounces when it touches. A point that sweeps press has met its surface. One
+/// that came again at once after it bounced is pressed from its other side, and sweeps stop it.
 #[inline(always)]
-fn will_bounce<L: Lane>(params: &StepParams<L>, contact: &Contact<L>, vn: L) -> L::Mask {
-    L::and(contact.restitution.gt(L::constant(0.0)), (-vn).gt(params.restitution_threshold))
+fn will_bounce<L: Lane>(params: &StepParams<L>, contact: &Contact<L>, vn: L, impulse: &Impulse<L>) -> L::Mask {
+    let zero = L::constant(0.0);
+    let speed = L::select(-vn, zero, impulse.normal.gt(zero));
+    let speed = L::select(speed, zero, zero.gt(impulse.bounce));
+    L::and(contact.restitution.gt(zero), speed.gt(params.restitution_threshold))
 }
 
 /// Non-penetration at one point.
@@ -142,7 +150,7 @@ fn solve_normal<L: Lane>(
     point: &Point<L>,
     impulse: &mut Impulse<L>,
 ) {
-    let correction = normal_correction(rules, params, common, pair, contact, point, impulse.normal);
+    let correction = normal_correction(rules, params, common, pair, contact, point, impulse);
     let sum = clamp_normal(rules, impulse.normal, correction);
     let change = sum - impulse.normal;
     impulse.normal = sum;
@@ -223,7 +231,7 @@ fn solve_as_one<L: Lane>(
     let mut wanted = [(L::constant(0.0), L::constant(0.0)); MAX_POINTS];
     for (k, wanted) in wanted.iter_mut().enumerate().take(rules.contact_points(rows.count())) {
         let (point, impulse) = (rows.point(k), rows.impulse(k));
-        let correction = normal_correction(rules, params, common, pair, contact, &point, impulse.normal);
+        let correction = normal_correction(rules, params, common, pair, contact, &point, &impulse);
         let change = clamp_normal(rules, impulse.normal, correction) - impulse.normal;
         *wanted = (change, lacking(&point, correction));
     }
@@ -244,7 +252,11 @@ pub fn clear_impulse<L: Lane>(impulse: &mut Impulse<L>) {
 #[inline(always)]
 pub fn sum_impulse<L: Lane>(is_first: bool, impulse: &Impulse<L>, total: &mut Impulse<L>) {
     let Vec3 { x, y, z } = impulse.components();
-    total.set_components(summed(is_first, total.components(), vec3(x + impulse.bounce, y, z)));
+    total.set_components(summed(
+        is_first,
+        total.components(),
+        vec3(x + larger(impulse.bounce, L::constant(0.0)), y, z),
+    ));
     total.bounce = L::constant(0.0);
 }
 
@@ -373,6 +385,7 @@ fn impact<L: Lane>(
     pair: &Pair<L>,
     contact: &Contact<L>,
     point: &Point<L>,
+    impulse: &Impulse<L>,
 ) -> Impact<L> {
     let (zero, half, h) = (L::constant(0.0), L::constant(0.5), params.substep);
     let s = current_separation(movement, contact, point);
@@ -385,7 +398,7 @@ fn impact<L: Lane>(
     // Exact without acceleration.
     let speed = -start - (point.pull + point.pull) * gap * reciprocal(root - start);
     let time = larger((gap + gap) * reciprocal(speed - start), -h);
-    let bounces = L::and(L::and((-s).gt(vn * h), will_bounce(params, contact, vn)), square.gt(zero));
+    let bounces = L::and(L::and((-s).gt(vn * h), will_bounce(params, contact, vn, impulse)), square.gt(zero));
     Impact {
         approach: L::select(zero, vn, bounces),
         speed: L::select(zero, speed, bounces),
@@ -393,13 +406,22 @@ fn impact<L: Lane>(
     }
 }
 
-/// Adds the change of a body's velocities by bounces to those without impulses, so that no later substep repeats it.
+/// Takes the velocities of a movable body without the impulses of this substep, with which it strikes others. Those of
+/// a warm start belong to the substep before.
 #[inline(always)]
-pub fn keep_bounces<L: Lane>(before: &Free<L>, after: &Body<L>, free: &mut Free<L>) {
-    let (v, w) = (after.v - before.v, after.w - before.w);
+pub fn begin_bounces<L: Lane>(mass: &Mass<L>, body: &mut Body<L>, free: &Free<L>) {
+    let is_movable = mass.inv_mass.gt(L::constant(0.0));
+    (body.v, body.w) = (select3(body.v, free.v, is_movable), select3(body.w, free.w, is_movable));
+}
+
+/// Adds the bounces of a body to its velocities `v` and `w` with impulses, and to those without.
+#[inline(always)]
+pub fn end_bounces<L: Lane>([v, w]: [Vec3<L>; 2], body: &mut Body<L>, free: &mut Free<L>) {
+    let changes = [body.v - free.v, body.w - free.w];
     // Velocities of bodies that do not bounce keep every bit.
-    let bounces = (dot3(v, v) + dot3(w, w)).gt(L::constant(0.0));
-    (free.v, free.w) = (select3(free.v, free.v + v, bounces), select3(free.w, free.w + w, bounces));
+    let bounces = (dot3(changes[0], changes[0]) + dot3(changes[1], changes[1])).gt(L::constant(0.0));
+    *free = Free { v: body.v, w: body.w };
+    (body.v, body.w) = (select3(v, v + changes[0], bounces), select3(w, w + changes[1], bounces));
 }
 
 /// Makes the points bounce that meet in this substep: first together, then each alone by its remaining approach. The
@@ -418,10 +440,21 @@ pub fn restitute_contact<L: Lane>(
     let before = [pair.a, pair.b];
     let mut wanted = [(zero, zero); MAX_POINTS];
     let mut impacts = [Impact { approach: zero, speed: zero, time: zero }; MAX_POINTS];
+    let mut came_again = [zero; MAX_POINTS];
     let end = rules.contact_points(rows.count());
     for k in 0..end {
         let point = rows.point(k);
-        impacts[k] = impact(rules, params, &movement, pair, contact, &point);
+        let impulse = rows.impulse(k);
+        let now = impact(rules, params, &movement, pair, contact, &point, &impulse);
+        // A point that bounced in the substep before comes again.
+        let again = L::select(zero, now.speed, impulse.bounce.gt(zero));
+        let is_again = again.gt(zero);
+        came_again[k] = L::select(zero, -again, is_again);
+        impacts[k] = Impact {
+            approach: L::select(now.approach, zero, is_again),
+            speed: L::select(now.speed, zero, is_again),
+            time: now.time,
+        };
         let lacking = factor * impacts[k].speed;
         wanted[k] = (point.normal_mass * lacking, lacking);
     }
@@ -434,7 +467,7 @@ pub fn restitute_contact<L: Lane>(
         let own = point.normal_mass * (factor * left);
         apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * own);
         let bounce = share * wanted[k].0 + own;
-        rows.set_bounce(k, bounce);
+        rows.set_bounce(k, bounce + came_again[k]);
         all = all + bounce;
         delay = delay + bounce * time;
     }

@@ -20,7 +20,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::Rules;
 use super::rows::{Impulse, ImpulseStep, Momentum};
-use crate::math::{Lane, Scalar, Vec3, dot3, reciprocal, vec3};
+use crate::math::{Lane, Scalar, Vec3, dot3, larger, reciprocal, vec3};
 
 /// Threads of a workgroup, the number of partial sums.
 const WORKGROUP: usize = 64;
@@ -78,7 +78,7 @@ impl<L: Lane> Impulse<L> {
     /// The normal impulse of the substep, which limits friction.
     #[inline(always)]
     pub fn pressing(&self, rules: Rules) -> L {
-        if rules.bounces { self.normal + self.bounce } else { self.normal }
+        if rules.bounces { self.normal + larger(self.bounce, L::constant(0.0)) } else { self.normal }
     }
 
     /// Sets the three components.

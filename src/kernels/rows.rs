@@ -152,7 +152,7 @@ pub struct Impulse<L> {
     pub tangent_1: L,
     /// Along the second tangent.
     pub tangent_2: L,
-    /// Normal impulse by which the point bounced in this substep.
+    /// Normal impulse by which the point bounced in this substep; below 0 if it came again at once.
     pub bounce: L,
 }
 

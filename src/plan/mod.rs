@@ -153,7 +153,7 @@ impl StepPlan {
         plan
     }
 
-    /// The substeps of a block. Each has velocities, warm start, restitution, biased sweeps, positions, relax sweeps, and
+    /// The substeps of a block. Each has velocities, restitution, warm start, biased sweeps, positions, relax sweeps, and
     /// sums of impulses.
     fn substeps(&mut self, config: &SolverConfig, problem: &StepProblem, block: u32, shared: Rules) {
         let own = &problem.blocks[block as usize];
@@ -201,6 +201,9 @@ impl StepPlan {
             if !problem.dampings.is_empty() {
                 self.over_colors(Kernel::DampVelocities { from_start }, block, bodies);
             }
+            if shared.bounces {
+                self.over_colors(Kernel::ApplyRestitution(shared.of_restitution()), block, &contacts);
+            }
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &joints);
             self.over_colors(Kernel::WarmStartJoints { axes: shared.axes }, block, &direct);
             if warm_start {
@@ -209,9 +212,6 @@ impl StepPlan {
                 self.over_colors(Kernel::WarmStart(shared.of_warm_start()), block, &contacts);
             } else if !contact_colors.is_empty() {
                 self.passes.push(Pass { kernel: Kernel::ClearImpulses, block, colors: contact_colors.clone() });
-            }
-            if shared.bounces {
-                self.over_colors(Kernel::ApplyRestitution(shared.of_restitution()), block, &contacts);
             }
             self.sweeps(sweeps(config.iterations), biased);
             self.over_colors(Kernel::IntegratePositions { from_start }, block, bodies);

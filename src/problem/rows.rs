@@ -368,7 +368,7 @@ pub struct ImpulseRow {
     pub tangent_1: f32,
     /// Along the second tangent, on b.
     pub tangent_2: f32,
-    /// Along the normal, on b, by the bounce of this substep.
+    /// Along the normal, on b, by the bounce of this substep; below 0 if the point came again at once after it bounced.
     pub bounce: f32,
 }
 

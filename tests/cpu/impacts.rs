@@ -274,3 +274,49 @@ fn a_row_of_balls_hands_a_blow_on_to_the_last() {
         }
     }
 }
+
+/// A ball without spin at 3 m/s along a floor and 4 m/s into it: with little friction it slides through the whole impact,
+/// with more it rolls at the end.
+#[test]
+fn friction_of_an_impact_is_limited_by_its_whole_impulse() {
+    for (e, friction) in [(0.8_f32, 0.1_f32), (0.8, 1.0), (0.0, 0.1), (1.0, 0.05), (0.5, 0.3)] {
+        let mut world = World { gravity: Vec3::ZERO, ..World::new() };
+        let surface = |body: Body| body.friction(friction).restitution(e);
+        world.insert(surface(Body::fixed().shape(Shape::half_space(Vec3::Y))));
+        let ball = surface(Body::dynamic().shape(Shape::ball(0.5))).position(0.0, 0.501, 0.0);
+        let ball = world.insert(ball.velocity(Vec3::new(3.0, -4.0, 0.0), Vec3::ZERO));
+        let mut simulation = started(world);
+        (0..12).for_each(|_| drop(simulation.step(DT).expect("a step")));
+        let body = &simulation.world.bodies[ball];
+        let along = (3.0 - friction * (1.0 + e) * 4.0).max(3.0 * 5.0 / 7.0);
+        let expected = Vec3::new(along, 4.0 * e, 0.0);
+        let spin = -(3.0 - along) * 2.5 / 0.5;
+        assert!(body.linear_velocity.distance(expected) < 2e-3, "{e} {friction}: {}", body.linear_velocity);
+        assert!((body.angular_velocity.z - spin).abs() < 1e-2, "{e} {friction}: {} rad/s", body.angular_velocity);
+    }
+}
+
+/// A block of 1 m falls on a ball of 10,000th its mass, which impacts alone cannot lift out of its way in time.
+#[test]
+fn a_heavy_body_does_not_sink_into_a_light_one_that_bounces() {
+    let deepest = |e: f32, speed: f32| {
+        let mut world = World::new();
+        let surface = |body: Body| body.friction(0.5).restitution(e);
+        world.insert(surface(Body::fixed().shape(Shape::half_space(Vec3::Y))));
+        world.insert(surface(Body::dynamic().shape(Shape::ball(0.2)).total_mass(1.0)).position(0.0, 0.2, 0.0));
+        let block = Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).total_mass(1e4);
+        world.insert(surface(block).position(0.0, 1.0, 0.0).velocity(-speed * Vec3::Y, Vec3::ZERO));
+        let mut simulation = started(world);
+        let mut deepest = 0.0_f64;
+        for _ in 0..120 {
+            simulation.step(DT).expect("a step");
+            deepest = deepest.max(simulation.penetration().max);
+        }
+        deepest
+    };
+    for e in [0.3, 0.6, 0.9] {
+        let [of_rigid, of_bouncing] = [0.0, e].map(|e| deepest(e, 4.0));
+        println!("{e}: {of_rigid} {of_bouncing}");
+        assert!(of_bouncing < of_rigid + 0.02, "{e}: {of_bouncing} m, and {of_rigid} m without restitution");
+    }
+}

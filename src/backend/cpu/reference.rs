@@ -3,7 +3,7 @@
 use super::super::{Backend, CheckedStep};
 use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use crate::error::Result;
-use crate::kernels::contact::{clear_impulse, keep_bounces, sum_impulse, summed};
+use crate::kernels::contact::{begin_bounces, clear_impulse, end_bounces, sum_impulse, summed};
 use crate::kernels::convergence::begin_sweep;
 use crate::kernels::integrate::{
     begin_changes, damp_velocities, end_changes, integrate_gyroscopic, integrate_positions, integrate_torque,
@@ -11,7 +11,7 @@ use crate::kernels::integrate::{
 };
 use crate::kernels::joint_system::{JointFactors, SystemRows, begin_system, solve_system, turned_inertia};
 use crate::kernels::momentum::{StepLength, chunked_sum, extrapolate, extrapolated, step_length};
-use crate::kernels::{Axis, Free, Impulse, ImpulseStep, Joint, KernelRows, Pair, Rules, Sym3};
+use crate::kernels::{Axis, Body, Free, Impulse, ImpulseStep, Joint, KernelRows, Mass, Pair, Rules, Sym3};
 use crate::math::{Scalar, Vec3};
 use crate::plan::{Kernel, Pass};
 use crate::problem::{ConvergenceRow, ImpulseNumber, JointRow, NodeRow, StepProblem};
@@ -187,7 +187,12 @@ impl<S: Scalar> Reference<S> {
                     let row = &problem.contacts[i];
                     let first = row.first_point as usize;
                     let own = first..first + row.point_count as usize + usize::from(rules.patch);
-                    let (mut pair, rows) = (self.load_pair(row.bodies()), &mut self.rows);
+                    let mut pair = self.load_pair(row.bodies());
+                    let moves_bodies = pass.kernel.moves_bodies();
+                    if moves_bodies {
+                        self.begin_bounces(rules, row.bodies(), &mut pair);
+                    }
+                    let rows = &mut self.rows;
                     let mut own = (&rows.points[own.clone()], &mut rows.impulses[own]);
                     sweep_contact(
                         pass.kernel,
@@ -197,8 +202,8 @@ impl<S: Scalar> Reference<S> {
                         &rows.contacts[i],
                         &mut own,
                     );
-                    if pass.kernel.moves_bodies() {
-                        self.store_bounces(rules, row.bodies(), &pair);
+                    if moves_bodies {
+                        self.end_bounces(rules, row.bodies(), &mut pair);
                     }
                     self.store_pair(row.bodies(), &pair);
                 }
@@ -269,18 +274,32 @@ impl<S: Scalar> Reference<S> {
         }
     }
 
+    fn begin_bounces(&self, rules: Rules, bodies: [u32; 2], pair: &mut Pair<S>) {
+        for (i, body, mass) in sides(bodies, pair) {
+            // An immovable body has no row of `free`.
+            if !rules.from_start && mass.inv_mass > S::constant(0.0) {
+                begin_bounces(&mass, body, &self.free[i]);
+            }
+        }
+    }
+
     /// Stores the movements of a pair that may have bounced, and the bounces in the velocities without impulses.
-    fn store_bounces(&mut self, rules: Rules, [a, b]: [u32; 2], pair: &Pair<S>) {
-        for (i, body, mass) in [(a as usize, &pair.a, &pair.mass_a), (b as usize, &pair.b, &pair.mass_b)] {
+    fn end_bounces(&mut self, rules: Rules, bodies: [u32; 2], pair: &mut Pair<S>) {
+        for (i, body, mass) in sides(bodies, pair) {
             if mass.inv_mass > S::constant(0.0) {
                 let row = &mut self.rows.bodies[i];
                 (row.dp, row.dq) = (body.dp, body.dq);
                 if !rules.from_start {
-                    keep_bounces(&Free { v: row.v, w: row.w }, body, &mut self.free[i]);
+                    end_bounces([row.v, row.w], body, &mut self.free[i]);
                 }
             }
         }
     }
+}
+
+/// The two bodies of a pair, each with its number and its mass.
+fn sides<S: Scalar>([a, b]: [u32; 2], pair: &mut Pair<S>) -> [(usize, &mut Body<S>, Mass<S>); 2] {
+    [(a as usize, &mut pair.a, pair.mass_a), (b as usize, &mut pair.b, pair.mass_b)]
 }
 
 /// The rows of a pass.

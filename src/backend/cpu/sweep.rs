@@ -11,7 +11,7 @@ use super::constraint::{Constraint, sweep_contact, sweep_joint};
 use super::lane_group::{BodyLanes, LaneGroup};
 use super::lane_rows::{GroupRows, OwnImpulses, SharedImpulses, SharedPoints};
 use crate::config::FrictionRule;
-use crate::kernels::contact::{keep_bounces, sum_impulse};
+use crate::kernels::contact::{begin_bounces, end_bounces, sum_impulse};
 use crate::kernels::{Body, Contact, Free, Impulse, Pair, Rules, StepParams};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work, row_at};
 use crate::plan::Kernel;
@@ -79,6 +79,14 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
                 pair.start_b = wide_start(free, &group.b.places, &pair.mass_b);
             }
         }
+        if AS_ONE && kernel.moves_bodies() && !kernel.is_from_start() {
+            let free = self.free.as_ptr();
+            // SAFETY: as above, and no other task of this color writes the rows of these bodies.
+            unsafe {
+                begin_bounces(&pair.mass_a, &mut pair.a, &wide_free(free, &group.a.places));
+                begin_bounces(&pair.mass_b, &mut pair.b, &wide_free(free, &group.b.places));
+            }
+        }
         let own = group.impulses();
         // Use impulses and rows in place: copies were most of the memory traffic of a sweep.
         // SAFETY: `LaneLayout::make_groups` gives each group impulses and points of its own.
@@ -97,8 +105,8 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
         // SAFETY: as above.
         unsafe {
             if AS_ONE && kernel.moves_bodies() {
-                self.store_bounces(kernel, &group.a, &pair.a);
-                self.store_bounces(kernel, &group.b, &pair.b);
+                self.end_bounces(kernel, &group.a, &mut pair.a);
+                self.end_bounces(kernel, &group.b, &mut pair.b);
             }
             store_velocities(states, &group.a, &pair.a);
             store_velocities(states, &group.b, &pair.b);
@@ -114,21 +122,25 @@ impl<C: Constraint, const AS_ONE: bool> Sweep<'_, C, AS_ONE> {
     /// # Safety
     /// That of [`store_velocities`], and each state has a row of `free` that no other task uses meanwhile.
     #[inline(always)]
-    unsafe fn store_bounces<L: Lanes>(&self, kernel: Kernel, bodies: &BodyLanes, body: &Body<L>) {
+    unsafe fn end_bounces<L: Lanes>(&self, kernel: Kernel, bodies: &BodyLanes, body: &mut Body<L>) {
         let BodyLanes { places, movable, .. } = *bodies;
         let (states, rows) = (self.bodies.as_ptr(), self.free.as_ptr());
-        // SAFETY: the caller's promise.
-        let (before, mut free) = unsafe { (wide_body::<L>(states, &places), wide_free::<L>(rows, &places)) };
-        keep_bounces(&Free { v: before.v, w: before.w }, body, &mut free);
-        let (movements, velocities) = (movement_rows(body), velocity_rows(free.v, free.w));
+        let movements = movement_rows(body);
+        if !kernel.is_from_start() {
+            // SAFETY: the caller's promise.
+            let (before, mut free) = unsafe { (wide_body::<L>(states, &places), wide_free::<L>(rows, &places)) };
+            end_bounces([before.v, before.w], body, &mut free);
+            let velocities = velocity_rows(free.v, free.w);
+            for lane in (0..WIDTH).filter(|lane| movable & (1 << lane) != 0) {
+                // SAFETY: the caller's promise.
+                unsafe { free_row(rows, places[lane]).write(velocities[lane]) };
+            }
+        }
         for lane in (0..WIDTH).filter(|lane| movable & (1 << lane) != 0) {
             // SAFETY: the caller's promise.
             unsafe {
-                row_at((&raw mut (*states).movement).cast_const(), places[lane]).cast_mut().write(movements[lane]);
-                if !kernel.is_from_start() {
-                    free_row(rows, places[lane]).write(velocities[lane]);
-                }
-            }
+                row_at((&raw mut (*states).movement).cast_const(), places[lane]).cast_mut().write(movements[lane])
+            };
         }
     }
 }
