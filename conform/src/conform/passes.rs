@@ -203,6 +203,12 @@ pub fn ways_to_run(kernel: Kernel, problem: &StepProblem) -> Vec<Vec<Pass>> {
         let first = in_one_pass(Kernel::IntegrateVelocities { warm_start: false, from_start: false }, problem);
         ways.iter_mut().for_each(|passes| *passes = [&first, &color_by_color(sweep(), problem), &passes[..]].concat());
     }
+    // Impacts read and write velocities without impulses, which the next warm start compares with those of the bodies.
+    if matches!(kernel, Kernel::ApplyRestitution(Rules { from_start: false, .. })) {
+        let [first, last] = [false, true]
+            .map(|warm_start| in_one_pass(Kernel::IntegrateVelocities { warm_start, from_start: false }, problem));
+        ways.iter_mut().for_each(|passes| *passes = [&first, &passes[..], &last].concat());
+    }
     // Changes count from `BeginChanges`, and only their sums with the velocities at that time remain.
     if kernel.is_from_start() || kernel == Kernel::EndChanges {
         let integrate = Kernel::IntegrateVelocities { warm_start: false, from_start: true };

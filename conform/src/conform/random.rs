@@ -267,6 +267,7 @@ fn body_row(random: &mut Random) -> BodyRow {
     row.v = random.vector(5.0).to_array();
     row.w = random.vector(17.0).to_array();
     row.dp = random.vector(0.1).to_array();
+    row.time = 4e-3;
     row.dq = random.rotation().to_array();
     row
 }
