@@ -1,13 +1,14 @@
 // apply_restitution: one thread makes the points of one manifold bounce that meet in this substep: first together, then
 // each alone by its remaining approach. The impulses act when the surfaces meet, so the bodies move before that time with
 // the velocities before them.
-// Reads contacts, points, masses. Writes impulses and movable bodies.
+// Reads contacts, points, masses. Writes impulses, free and movable bodies.
 // No other thread of this dispatch writes those bodies, because of the colors (src/graph.rs).
 // Twin: src/kernels/contact.rs.
 
-// The impact of a point: its normal velocity before any impact, the speed at which the surfaces meet, and the time from
-// the start of the substep. All are 0 if the point does not bounce.
-struct Impact { approach: f32, speed: f32, time: f32 }
+// The impact of a point: its normal velocity before any impact, the speed at which the surfaces meet (0 if the point does
+// not bounce), the time from the start of the substep, and the speed of a point that bounced in the substep before, and
+// comes again instead of bouncing.
+struct Impact { approach: f32, speed: f32, time: f32, again: f32 }
 
 fn impact_at(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: Point, impulse: Impulse, movement: NormalMovement) -> Impact {
     let h = pass_row.substep;
@@ -21,8 +22,11 @@ fn impact_at(rules: Rules, pair: ptr<function, Pair>, contact: Contact, point: P
     // Exact without acceleration.
     let speed = -start - (point.pull + point.pull) * gap * reciprocal(root - start);
     let time = larger((gap + gap) * reciprocal(speed - start), -h);
-    if -s > vn * h && will_bounce(contact, vn, impulse) && square > 0.0 { return Impact(vn, speed, time); }
-    return Impact(0.0, 0.0, 0.0);
+    if -s > vn * h && will_bounce(contact, vn, impulse) && square > 0.0 {
+        if impulse.bounce > 0.0 { return Impact(vn, 0.0, time, speed); }
+        return Impact(vn, speed, time, 0.0);
+    }
+    return Impact(vn, 0.0, 0.0, 0.0);
 }
 
 // Moves a body back by the time in which it still had its former velocities.
@@ -69,18 +73,10 @@ fn restitute_contact(rules: Rules, i: u32) {
     let before_a = pair.a;
     let before_b = pair.b;
     var impacts: array<Impact, 4>;
-    var came_again: array<f32, 4>;
     var together = Together();
     for (var k = 0u; k < contact.point_count; k++) {
         let point = points[contact.first_point + k];
-        let impulse = impulses[contact.first_point + k];
-        impacts[k] = impact_at(rules, &pair, contact, point, impulse, movement);
-        came_again[k] = 0.0;
-        // A point that bounced in the substep before comes again.
-        if impulse.bounce > 0.0 && impacts[k].speed > 0.0 {
-            came_again[k] = -impacts[k].speed;
-            impacts[k] = Impact(0.0, 0.0, 0.0);
-        }
+        impacts[k] = impact_at(rules, &pair, contact, point, impulses[contact.first_point + k], movement);
         let lacking = factor * impacts[k].speed;
         add_point(&together, k, point, Wanted(point.normal_mass * lacking, lacking));
     }
@@ -95,7 +91,7 @@ fn restitute_contact(rules: Rules, i: u32) {
         let own = point.normal_mass * (factor * left);
         apply_impulse(rules.isotropic, &pair, point.r_a, point.r_b, contact.normal * own);
         let bounce = share * together.changes[k] + own;
-        impulses[contact.first_point + k].bounce = bounce + came_again[k];
+        impulses[contact.first_point + k].bounce = bounce - impact.again;
         all = all + bounce;
         delay = delay + bounce * impact.time;
     }

@@ -364,12 +364,14 @@ fn sweep_friction<L: Lane>(
 /// The impact of a point within a substep.
 #[derive(Clone, Copy)]
 struct Impact<L> {
-    /// Normal velocity before any impact; 0 if the point does not bounce.
+    /// Normal velocity before any impact.
     approach: L,
-    /// Speed at which the surfaces meet.
+    /// Speed at which the surfaces meet; 0 if the point does not bounce.
     speed: L,
     /// Time from the start of the substep.
     time: L,
+    /// That speed of a point that bounced in the substep before, and comes again instead of bouncing.
+    again: L,
 }
 
 /// The impact of a point, if it closes within the substep and faster than the threshold. Its time is below zero if the
@@ -399,11 +401,10 @@ fn impact<L: Lane>(
     let speed = -start - (point.pull + point.pull) * gap * reciprocal(root - start);
     let time = larger((gap + gap) * reciprocal(speed - start), -h);
     let bounces = L::and(L::and((-s).gt(vn * h), will_bounce(params, contact, vn, impulse)), square.gt(zero));
-    Impact {
-        approach: L::select(zero, vn, bounces),
-        speed: L::select(zero, speed, bounces),
-        time: L::select(zero, time, bounces),
-    }
+    let met = L::select(zero, speed, bounces);
+    // A point that bounced in the substep before comes again.
+    let again = L::select(zero, met, impulse.bounce.gt(zero));
+    Impact { approach: vn, speed: met - again, time: L::select(zero, time, bounces), again }
 }
 
 /// Takes the velocities of a movable body without the impulses of this substep, with which it strikes others. Those of
@@ -439,35 +440,24 @@ pub fn restitute_contact<L: Lane>(
     let movement = normal_movement(rules, pair, contact);
     let before = [pair.a, pair.b];
     let mut wanted = [(zero, zero); MAX_POINTS];
-    let mut impacts = [Impact { approach: zero, speed: zero, time: zero }; MAX_POINTS];
-    let mut came_again = [zero; MAX_POINTS];
+    let mut impacts = [Impact { approach: zero, speed: zero, time: zero, again: zero }; MAX_POINTS];
     let end = rules.contact_points(rows.count());
     for k in 0..end {
         let point = rows.point(k);
-        let impulse = rows.impulse(k);
-        let now = impact(rules, params, &movement, pair, contact, &point, &impulse);
-        // A point that bounced in the substep before comes again.
-        let again = L::select(zero, now.speed, impulse.bounce.gt(zero));
-        let is_again = again.gt(zero);
-        came_again[k] = L::select(zero, -again, is_again);
-        impacts[k] = Impact {
-            approach: L::select(now.approach, zero, is_again),
-            speed: L::select(now.speed, zero, is_again),
-            time: now.time,
-        };
+        impacts[k] = impact(rules, params, &movement, pair, contact, &point, &rows.impulse(k));
         let lacking = factor * impacts[k].speed;
         wanted[k] = (point.normal_mass * lacking, lacking);
     }
     let share = press_as_one(rules, pair, contact, rows, &wanted);
     let (mut all, mut delay) = (zero, zero);
     for k in 0..end {
-        let (point, Impact { approach, speed, time }) = (rows.point(k), impacts[k]);
+        let (point, Impact { approach, speed, time, again }) = (rows.point(k), impacts[k]);
         let vn = dot3(relative_velocity(rules, pair, point.r_a, point.r_b), contact.normal);
         let left = L::select(zero, larger(speed + (approach - vn), zero), speed.gt(zero));
         let own = point.normal_mass * (factor * left);
         apply_impulse(rules, pair, point.r_a, point.r_b, contact.normal * own);
         let bounce = share * wanted[k].0 + own;
-        rows.set_bounce(k, bounce + came_again[k]);
+        rows.set_bounce(k, bounce - again);
         all = all + bounce;
         delay = delay + bounce * time;
     }

@@ -90,7 +90,10 @@ impl Pass {
                 let once = size_of::<PointRow>() + IMPULSE * if writes { 2 } else { 1 };
                 // Friction at points reads them a second time; friction per manifold adds one row.
                 let again = if writes && rules.friction != FrictionRule::None && !rules.patch { points } else { 0 };
-                contacts * (size_of::<ContactRow>() + pair) + (points + again + patches) * once
+                // Bounces move bodies, and change the velocities without impulses.
+                let free = if rules.from_start { 0 } else { 2 * size_of::<FreeRow>() };
+                let moved = if self.kernel.moves_bodies() { 2 * (BODY / 2 + free) } else { 0 };
+                contacts * (size_of::<ContactRow>() + pair + moved) + (points + again + patches) * once
             }
         };
         bytes as u64

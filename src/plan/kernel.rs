@@ -190,7 +190,7 @@ impl Kernel {
         measures && self.is_from_start()
     }
 
-    /// Whether the kernel keeps the largest impulses of points.
+    /// Whether the kernel keeps the bounces of points.
     pub fn keeps_bounces(self) -> bool {
         match self {
             Self::SolveContacts(rules) => rules.bounces,
@@ -198,7 +198,7 @@ impl Kernel {
         }
     }
 
-    /// Whether the kernel reads the approach velocities or the slips of points.
+    /// Whether the kernel reads the relative accelerations or the slips of points.
     pub fn reads_pull_or_slip(self) -> bool {
         match self {
             Self::SolveContacts(rules) => rules.patch || rules.driven || rules.friction == FrictionRule::Slip,

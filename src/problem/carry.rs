@@ -17,8 +17,8 @@ pub struct Carry {
     pub on_device: bool,
     /// The contacts whose rows were written again since, in ascending order.
     pub written: Vec<Written>,
-    /// Whether approach velocities and slips of reused points also follow the bodies, besides their separations.
-    pub approach: bool,
+    /// Whether relative accelerations and slips of reused points also follow the bodies, besides their separations.
+    pub pull_or_slip: bool,
     /// Whether points have surface velocities, patches resist rolling, or bodies have locked translations. The device
     /// cannot compute such rows.
     pub surfaces: bool,
@@ -28,12 +28,12 @@ pub struct Carry {
     pub preload: Preload,
 }
 
-crate::saved::cloned!(Carry { on_device, written, approach, surfaces, tangents, preload });
+crate::saved::cloned!(Carry { on_device, written, pull_or_slip, surfaces, tangents, preload });
 
 impl Carry {
     /// Whether the host sends all points in each step, since the device cannot compute them.
     pub fn sends_points(&self) -> bool {
-        self.approach || self.surfaces
+        self.pull_or_slip || self.surfaces
     }
 }
 

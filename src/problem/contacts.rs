@@ -436,7 +436,7 @@ impl ContactRows {
         problem.params.rolls = layout.rolls.into();
         problem.params.driven = layout.driven.into();
         self.carry.surfaces = layout.rolls || layout.driven || locked;
-        self.carry.approach = config.friction_rule() == FrictionRule::Slip || bounce;
+        self.carry.pull_or_slip = config.friction_rule() == FrictionRule::Slip || bounce;
         self.carry.tangents = matches!(config.friction_rule(), FrictionRule::Box | FrictionRule::Disc);
         let substep = Substep::new(config, dt / config.substeps as f32);
         self.carry.preload = Preload {

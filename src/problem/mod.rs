@@ -86,7 +86,7 @@ pub struct StepProblem {
     pub points: Vec<PointRow>,
     /// Impulses of the points.
     pub impulses: Vec<ImpulseRow>,
-    /// Sums of the impulses over the substeps of the step, without peaks; empty unless they are asked for.
+    /// Sums of the impulses over the substeps of the step, bounces in their normal parts; empty unless they are asked for.
     pub totals: Vec<ImpulseRow>,
     /// Sag of each manifold at rest under its load in the step before, from the masses of its bodies without their
     /// inertia (m).

@@ -122,11 +122,11 @@ impl Writer<'_> {
             }
             self.prepare(&mut rows, begun.all(), Preparation::Begin { separations: false, loads: true });
         }
-        if self.carry.approach {
+        if self.carry.pull_or_slip {
             for &i in begun.all() {
                 let contact = &rows.contacts[i as usize];
                 let own = &mut rows.points[i as usize * stride..][..contact.point_count as usize];
-                own.iter_mut().for_each(|point| self.approach(contact, point));
+                own.iter_mut().for_each(|point| self.write_pull_and_slip(contact, point));
             }
         }
     }
@@ -279,7 +279,7 @@ impl Writer<'_> {
 
     /// Writes the numbers of a point that the motion of its bodies decides when the step begins: their relative
     /// acceleration, and the slip direction if friction has only one direction.
-    fn approach(&self, row: &ContactRow, point: &mut PointRow) {
+    fn write_pull_and_slip(&self, row: &ContactRow, point: &mut PointRow) {
         let masses = [row.body_a, row.body_b].map(|i| &self.masses[i as usize]);
         let [pull_a, pull_b] = masses.map(|m| Vec3::from_array(m.acceleration));
         point.pull = if row.restitution > 0.0 { (pull_b - pull_a).dot(row.normal.into()) } else { 0.0 };

@@ -316,7 +316,6 @@ fn a_heavy_body_does_not_sink_into_a_light_one_that_bounces() {
     };
     for e in [0.3, 0.6, 0.9] {
         let [of_rigid, of_bouncing] = [0.0, e].map(|e| deepest(e, 4.0));
-        println!("{e}: {of_rigid} {of_bouncing}");
         assert!(of_bouncing < of_rigid + 0.02, "{e}: {of_bouncing} m, and {of_rigid} m without restitution");
     }
 }

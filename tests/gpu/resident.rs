@@ -128,7 +128,8 @@ fn a_device_bounces_with_the_bits_of_the_reference() {
         assert_eq!(stats[0].manifolds, 1, "step {step}");
         assert_together(&both, &format!("step {step}"));
         let speed = both[0].world.bodies[1].linear_velocity.y;
-        bounces += u32::from(speed > before);
+        // Gravity takes 0.16 m/s a step.
+        bounces += u32::from(speed > before + 0.1);
         before = speed;
     }
     assert!(bounces > 5, "{bounces} bounces");

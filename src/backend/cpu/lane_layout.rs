@@ -28,9 +28,9 @@ pub(super) struct ImpulsePlace {
 /// The optional numbers of a step that some passes use.
 #[derive(Clone, Copy)]
 pub(super) struct Uses {
-    /// Largest impulses of points.
+    /// Bounces of points.
     pub bounces: bool,
-    /// Approach velocities and slips of points.
+    /// Relative accelerations and slips of points.
     pub pull_or_slip: bool,
 }
 

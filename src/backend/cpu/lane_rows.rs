@@ -1,7 +1,7 @@
 //! Points and impulses of the lanes, separated by use: a sweep streams only the numbers that it reads.
 //!
 //! A biased sweep without friction reads the first eight numbers of a point and its normal impulse. Friction reads one
-//! more number and the two tangential impulses. The lanes hold approach velocities, slips and largest impulses only if
+//! more number and the two tangential impulses. The lanes hold relative accelerations, slips and bounces only if
 //! a pass uses them.
 
 #![allow(unsafe_code)]
@@ -29,7 +29,7 @@ pub(super) struct LanePoints {
     pub arms: Vec<[Wide; 8]>,
     /// Tangent mass; the ninth number of an axis.
     pub tangent_masses: Vec<Wide>,
-    /// Approach velocity and slip; the last three numbers of an axis. Empty if no pass reads them.
+    /// Relative acceleration and slip; the last three numbers of an axis. Empty if no pass reads them.
     pub others: Vec<[Wide; 3]>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct LaneImpulses {
     pub normals: Vec<Wide>,
     /// Along both tangents.
     pub tangents: Vec<[Wide; 2]>,
-    /// The largest normal impulses; empty if no pass keeps them.
+    /// The bounces; empty if no pass keeps them.
     pub bounces: Vec<Wide>,
 }
 
@@ -77,7 +77,7 @@ impl LaneImpulses {
         SharedImpulses { normals: Shared::new(normals), tangents: Shared::new(tangents), bounces: Shared::new(bounces) }
     }
 
-    /// Normal impulse and friction, and the largest normal impulse or zero.
+    /// Normal impulse and friction, and the bounce or zero.
     #[inline(always)]
     pub fn numbers(&self, i: usize) -> [&Wide; 4] {
         let [one, two] = &self.tangents[i];
@@ -227,7 +227,7 @@ impl OwnImpulses<'_> {
         self.impulse::<L>(k).components()
     }
 
-    /// Sixteen impulses. The largest ones are zero if no pass keeps them.
+    /// Sixteen impulses. The bounces are zero if no pass keeps them.
     #[inline(always)]
     pub fn impulse<L: Lanes>(&self, k: usize) -> Impulse<L> {
         let [tangent_1, tangent_2] = loaded!(&self.tangents[k]; 0 1);

@@ -85,10 +85,10 @@ impl<C: Constraint> Load<'_, C> {
             let all: &[[f32; 12]] = bytemuck::cast_slice(&self.problem.points);
             let rows: [&[f32]; WIDTH] = lanes!(lane => &all[firsts[lane] + k][..]);
             *arms = first_eight::<L>(&rows);
-            let [.., tangent_mass, approach, slip_1, slip_2] = last_eight::<L>(&rows);
+            let [.., tangent_mass, pull, slip_1, slip_2] = last_eight::<L>(&rows);
             points.tangent_masses[k] = tangent_mass;
             if let Some(others) = points.others.get_mut(k) {
-                *others = [approach, slip_1, slip_2];
+                *others = [pull, slip_1, slip_2];
             }
         }
         let all = C::impulses(self.problem);
@@ -173,7 +173,7 @@ impl<C: Constraint> Work for Store<'_, C> {
 }
 
 impl<C: Constraint> Store<'_, C> {
-    /// Writes an impulse. The largest impulses stay unchanged if the lanes have none.
+    /// Writes an impulse. The bounces stay unchanged if the lanes have none.
     ///
     /// # Safety
     /// No other task has the same one.
