@@ -68,15 +68,17 @@ fn a_ball_bounces_to_the_square_of_its_restitution() {
     }
 }
 
-/// Of sixteen balls that fall from different heights some bounce in the last substep of a step.
+/// Of sixteen balls that fall from different heights some bounce in the last substep of a step. They bounce so low that
+/// their contacts stay.
 #[test]
 fn a_step_begins_without_the_bounces_of_the_step_before() {
     let mut world = World::new();
-    world.insert(floor().restitution(0.5));
+    world.insert(floor().restitution(0.95));
     for i in 0..16 {
-        world.insert(ball().restitution(0.5).position(3.0 * i as f32, 1.0 + 0.013 * i as f32, 0.0));
+        world.insert(ball().restitution(0.95).position(3.0 * i as f32, 0.504 + 3e-4 * i as f32, 0.0));
     }
-    let mut simulation = simulation(world, SolverConfig::default().without_sleep());
+    let config = SolverConfig::default().without_sleep().with(|c| c.restitution_threshold = 0.1);
+    let mut simulation = simulation(world, config);
     let bounces = |problem: &StepProblem| problem.impulses.iter().filter(|impulse| impulse.bounce > 0.0).count();
     let mut found = 0;
     for _ in 0..60 {
