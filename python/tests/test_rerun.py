@@ -59,7 +59,6 @@ def shapes() -> ds.Scene:
 
 
 def test_a_run_is_written_with_poses_contacts_and_errors(tmp_path: Path) -> None:
-    pytest.importorskip("rerun")
     scene = ds.Scene.find("tower", n=3)
     batch = ds.Batch(scene, 2, listen=["impulses"])
     path = tmp_path / "run.rrd"

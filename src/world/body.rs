@@ -1181,16 +1181,14 @@ impl Body {
                 || format!("{name} = {load}: must accelerate the body by at most {MAX_GRAVITY:e} along every axis");
             ensure(is_within(acceleration, MAX_GRAVITY), message)?;
         }
-        for (name, rate) in [("linear_damping", self.linear_damping), ("angular_damping", self.angular_damping)] {
-            ensure((0.0..=MAX_DAMPING).contains(&rate), || {
-                format!("{name} = {rate}: must be 0 to {MAX_DAMPING:e} 1/s")
-            })?;
-        }
-        for (name, speed) in
-            [("max_linear_speed", self.max_linear_speed), ("max_angular_speed", self.max_angular_speed)]
-        {
-            ensure(speed >= 0.0, || format!("{name} = {speed}: must be 0 or more"))?;
-        }
+        let check_damping = |name: &str, rate: f32| {
+            ensure((0.0..=MAX_DAMPING).contains(&rate), || format!("{name} = {rate}: must be 0 to {MAX_DAMPING:e} 1/s"))
+        };
+        check_damping("linear_damping", self.linear_damping)?;
+        check_damping("angular_damping", self.angular_damping)?;
+        let check_cap = |name: &str, speed: f32| ensure(speed >= 0.0, || format!("{name} = {speed}: must be 0 or more"));
+        check_cap("max_linear_speed", self.max_linear_speed)?;
+        check_cap("max_angular_speed", self.max_angular_speed)?;
         let scale = self.gravity_scale;
         ensure(scale.abs() <= MAX_GRAVITY, || {
             format!("gravity_scale = {scale}: must be at most {MAX_GRAVITY:e} in size")

@@ -24,6 +24,8 @@ pub enum Family {
     Ratios,
     /// Anchors up to 100 sizes of the second body beside it.
     Levers,
+    /// Restitution from 0 to 1 of each body.
+    Bouncing,
 }
 
 named!(Family {
@@ -33,6 +35,7 @@ named!(Family {
     Kinematic = "kinematic",
     Ratios = "ratios",
     Levers = "levers",
+    Bouncing = "bouncing",
 });
 
 /// The joints of a world.
@@ -168,6 +171,7 @@ fn body(random: &mut Random, family: Family) -> (Body, f32) {
     let (velocity, spin) = (random.vector(3.0), random.vector(5.0));
     let keep = |keeps: bool, v: Vec3| if keeps { v } else { Vec3::ZERO };
     let body = body.velocity(keep(moves, velocity), keep(turns, spin));
+    let body = if family == Family::Bouncing { body.restitution(random.within(0.0, 1.0)) } else { body };
     (if family == Family::Ratios { body.total_mass(mass) } else { body.density(density) }, size)
 }
 
