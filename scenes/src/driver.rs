@@ -1,23 +1,21 @@
 //! Drives a body of a scene by the input of a person.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
+use drystone::stages::error::ensure;
 use drystone::stages::math::rotation::{about, product, unit};
-use drystone::{Axis, BodyHandle, Bounds, Character, Result, Simulation, World};
+use drystone::world::Collider;
+use drystone::{Axis, Body, BodyHandle, BodyKind, Bounds, Character, Drive, Result, Simulation, World};
 
 /// Speed of a walk (m/s), angular speed of its turns (rad/s), and speed of a jump (m/s).
 const WALK_SPEED: f32 = 2.5;
 const TURN_RATE: f32 = 2.0;
 const JUMP_SPEED: f32 = 4.0;
-/// The vehicle of the catalogue: radius of its wheels (m), its wheelbase (m), and the largest torque on each wheel (N m).
-pub(crate) const RADIUS: f32 = 0.35;
-pub(crate) const WHEELBASE: f32 = 2.6;
-pub(crate) const TORQUE: f32 = 300.0;
-/// Largest speed of the vehicle (m/s) and steering (rad), and the angular speed at which the wheels steer (rad/s).
+/// Largest speed of a vehicle (m/s) and steering (rad), and the angular speed at which the wheels steer (rad/s).
 const MAX_SPEED: f32 = 10.0;
 const MAX_STEERING: f32 = 0.5;
 const STEERING_RATE: f32 = 1.0;
-/// Largest lateral acceleration to which a driver steers (m/s²). The vehicle turns over at up to 1.26 g.
+/// Largest lateral acceleration to which a driver steers (m/s²). The vehicle of the catalogue turns over at up to 1.26 g.
 const MAX_LATERAL: f32 = 4.0;
 
 /// Drives a body of a scene by the input of a person: a character that walks, or a vehicle with motors and steering.
@@ -65,7 +63,8 @@ impl Driver {
         Self::of(Driven::Character(Character::new(body)))
     }
 
-    /// Drives the vehicle of the catalogue with this chassis.
+    /// Drives a vehicle with this chassis, and wheels on joints to it. Its x axis is forward, and its y axis up. The first
+    /// angle of a joint is that of the wheel about its axle, which a motor turns; the second steers it between limits.
     pub(crate) fn vehicle(chassis: BodyHandle) -> Self {
         Self::of(Driven::Vehicle(chassis))
     }
@@ -78,6 +77,22 @@ impl Driver {
     pub fn body(&self) -> BodyHandle {
         match self.driven {
             Driven::Character(Character { body, .. }) | Driven::Vehicle(body) => body,
+        }
+    }
+
+    /// Refuses a character that is not kinematic, and a vehicle without wheels on two axles.
+    #[cfg(feature = "serde")]
+    pub(crate) fn check(&self, world: &World) -> Result<()> {
+        match self.driven {
+            Driven::Character(Character { body, .. }) => {
+                ensure(world.bodies[body].kind == BodyKind::Kinematic, || "a character must be kinematic".into())
+            }
+            Driven::Vehicle(chassis) => {
+                let (rear, front) = axles(world, chassis);
+                ensure(rear < front, || {
+                    "a vehicle needs joints whose second body it is, at two places along its x axis".into()
+                })
+            }
         }
     }
 
@@ -129,33 +144,52 @@ pub(crate) struct Turn {
     pub speed: f32,
     /// Angle of a wheel in the middle of the front axle, positive to the left (rad).
     pub steering: f32,
+    /// Places of the rear and of the front axle along x (m).
+    pub axles: (f32, f32),
 }
 
 impl Turn {
-    /// Angle of a wheel (rad) and its angular speed about Z (rad/s). All axles pass through the center of one circle,
-    /// and each wheel rolls at the speed of its place.
+    /// Angle of a wheel (rad) and its speed over the ground (m/s), at its place along x and z. All axles pass through the
+    /// center of one circle.
     pub(crate) fn of_wheel(&self, (x, z): (f32, f32)) -> (f32, f32) {
-        let curvature = libm::tanf(self.steering) / WHEELBASE;
+        // A vehicle that lost an axle does not steer.
+        let wheelbase = self.axles.1 - self.axles.0;
+        let curvature = if wheelbase > 0.0 { libm::tanf(self.steering) / wheelbase } else { 0.0 };
         // From the middle of the rear axle.
-        let (ahead, across) = (curvature * (x + 0.5 * WHEELBASE), 1.0 + curvature * z);
-        let angle = libm::atan2f(ahead, across);
-        (angle, -self.speed / RADIUS * (ahead * ahead + across * across).sqrt())
+        let (ahead, across) = (curvature * (x - self.axles.0), 1.0 + curvature * z);
+        (libm::atan2f(ahead, across), self.speed * (ahead * ahead + across * across).sqrt())
     }
+}
+
+/// Places of the rear and of the front axle of a chassis along x (m).
+fn axles(world: &World, chassis: BodyHandle) -> (f32, f32) {
+    let wheels = || world.joints.iter().filter(|joint| joint.body_b == Some(chassis)).map(|joint| joint.anchor_b.x);
+    (wheels().fold(f32::INFINITY, f32::min), wheels().fold(f32::NEG_INFINITY, f32::max))
 }
 
 /// Turns and steers the wheels of a chassis in a step of `dt` seconds: forward and to the right by -1 to 1.
 fn drive(world: &mut World, chassis: BodyHandle, forward: f32, right: f32, dt: f32) {
     let Some(body) = world.body(chassis) else { return };
     let speed = body.linear_velocity.dot(body.rotation * Vec3::X);
-    let sharpest = libm::atanf(MAX_LATERAL * WHEELBASE / (speed * speed)).min(MAX_STEERING);
-    let turn = Turn { speed: forward * MAX_SPEED, steering: -right * sharpest };
-    for joint in world.joints.iter_mut().filter(|joint| joint.body_b == Some(chassis)) {
-        let (angle, spin) = turn.of_wheel((joint.anchor_b.x, joint.anchor_b.z));
+    let axles = axles(world, chassis);
+    let sharpest = libm::atanf(MAX_LATERAL * (axles.1 - axles.0) / (speed * speed)).min(MAX_STEERING);
+    let turn = Turn { speed: forward * MAX_SPEED, steering: -right * sharpest, axles };
+    let World { bodies, joints, .. } = world;
+    for joint in joints.iter_mut().filter(|joint| joint.body_b == Some(chassis)) {
+        let (angle, speed) = turn.of_wheel((joint.anchor_b.x, joint.anchor_b.z));
         let [roll, steer, _] = &mut joint.angular;
-        *roll = roll.motor(spin, TORQUE);
+        if let Drive::Motor { max_load, .. } = roll.drive {
+            *roll = roll.motor(-speed / radius(&bodies[joint.body_a]), max_load);
+        }
         if let Bounds::Between { min, .. } = steer.bounds {
             let angle = min + (angle - min).clamp(-STEERING_RATE * dt, STEERING_RATE * dt);
             *steer = Axis::limited(angle, angle);
         }
     }
+}
+
+/// Radius of a wheel (m): the largest extent of its shapes from its center.
+fn radius(wheel: &Body) -> f32 {
+    let extent = |collider: &Collider| collider.bounds(Vec3::ZERO, Quat::IDENTITY).1.max_element();
+    wheel.colliders.iter().map(extent).fold(0.0, f32::max)
 }

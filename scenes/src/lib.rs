@@ -30,7 +30,7 @@ pub use catalogue::{CATALOGUE, Entry, Family, Law, Member, Parameter};
 pub use driver::Driver;
 #[cfg(feature = "serde")]
 pub use file::{
-    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile,
+    AdditionalMassFile, AxisFile, BodyFile, BodyRef, DriverFile, Geometry, JointFile, JointKind, LeavesFile, MassFile,
     MaterialFile, MotorFile, SceneFile, ShapeFile, SpawnerFile, SpringFile, load, schema,
 };
 pub use recording::{Recorder, RecordingIntervals, Replay, ReplayDifference};

@@ -1186,7 +1186,8 @@ impl Body {
         };
         check_damping("linear_damping", self.linear_damping)?;
         check_damping("angular_damping", self.angular_damping)?;
-        let check_cap = |name: &str, speed: f32| ensure(speed >= 0.0, || format!("{name} = {speed}: must be 0 or more"));
+        let check_cap =
+            |name: &str, speed: f32| ensure(speed >= 0.0, || format!("{name} = {speed}: must be 0 or more"));
         check_cap("max_linear_speed", self.max_linear_speed)?;
         check_cap("max_angular_speed", self.max_angular_speed)?;
         let scale = self.gravity_scale;

@@ -2,7 +2,7 @@
 
 use drystone::glam::Vec3;
 use drystone::{Backend, Body, Cpu, Reference, Simulation, SolverConfig};
-use drystone_scenes::{Driver, Scene};
+use drystone_scenes::{Driver, Scene, SceneFile};
 
 /// A scene with its driver.
 struct Drive {
@@ -92,6 +92,86 @@ fn the_same_inputs_give_the_same_bits() {
             drive.simulation.hash()
         };
         assert_eq!(hash(Box::new(Reference::<f32>::new())), hash(Box::new(Cpu::new())), "{name}");
+    }
+}
+
+#[test]
+fn a_scene_file_keeps_its_driver() {
+    for name in ["course", "vehicle"] {
+        let run = |scene: Scene| {
+            let simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()));
+            let (simulation, driver) = (simulation.expect("a simulation"), scene.driver.expect("a driver"));
+            let mut drive = Drive { simulation, driver, dt: scene.dt };
+            drive.steps(30, 1.0, 0.5, false);
+            drive.simulation.hash()
+        };
+        let scene = Scene::find(name, &[]).expect("a scene");
+        let text = SceneFile::of(&scene).expect("a file").to_text();
+        let read = SceneFile::parse(&text).and_then(|file| file.into_scene(name)).expect("a scene");
+        assert_eq!((read.driver, run(read)), (scene.driver, run(scene)), "{name}");
+    }
+}
+
+/// A cart of its own: wheels of 0.2 m on one axle are driven, and those of 0.3 m on the other are steered.
+#[test]
+fn a_file_has_a_vehicle_of_any_size() {
+    let wheel = |x: f32, z: f32, radius: f32| {
+        format!(
+            r#",{{"name": "wheel {x} {z}", "position": [{x}, {radius}, {z}], "mass": 5, "friction": 1,
+            "rotation": [0.70710678, 0, 0, 0.70710678],
+            "shapes": [{{"type": "cylinder", "half_height": 0.05, "radius": {radius}}}]}}"#
+        )
+    };
+    let joint = |x: f32, z: f32, radius: f32| {
+        let [roll, steer] = if x < 0.0 {
+            [r#"{"motor": {"speed": 0, "max_load": 40}}"#, r#"{"locked": true}"#]
+        } else {
+            ["{}", r#"{"limits": [0, 0]}"#]
+        };
+        format!(
+            r#",{{"type": "generic", "bodies": ["wheel {x} {z}", "chassis"], "anchor": [{x}, {radius}, {z}],
+            "frame": [0, -0.70710678, 0, 0.70710678],
+            "linear": [{{"locked": true}}, {{"locked": true}}, {{"locked": true}}],
+            "angular": [{roll}, {steer}, {{"locked": true}}]}}"#
+        )
+    };
+    let places = [(-0.6, -0.4, 0.2), (-0.6, 0.4, 0.2), (0.6, -0.4, 0.3), (0.6, 0.4, 0.3)];
+    let list = |part: &dyn Fn(f32, f32, f32) -> String| places.map(|(x, z, radius)| part(x, z, radius)).concat();
+    let text = format!(
+        r#"{{"version": 1, "driver": {{"type": "vehicle", "body": "chassis"}},
+        "bodies": [{{"name": "floor", "kind": "fixed", "friction": 1, "shapes": [{{"type": "half_space", "normal": [0, 1, 0]}}]}},
+        {{"name": "chassis", "position": [0, 0.5, 0], "mass": 60, "shapes": [{{"type": "cuboid", "half_extents": [0.7, 0.1, 0.3]}}]}}
+        {}], "joints": [{}]}}"#,
+        list(&wheel),
+        &list(&joint)[1..]
+    );
+    let scene = SceneFile::parse(&text).and_then(|file| file.into_scene("cart")).expect("a scene");
+    let simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()));
+    let (simulation, driver) = (simulation.expect("a simulation"), scene.driver.expect("a driver"));
+    let mut drive = Drive { simulation, driver, dt: scene.dt };
+    drive.steps(180, 0.5, 0.0, false);
+    let Vec3 { x: speed, .. } = drive.body().linear_velocity;
+    // Half of the largest speed, 10 m/s: the radius of each wheel is its own.
+    assert!((speed - 5.0).abs() < 0.05, "{speed} m/s");
+    drive.steps(60, 0.5, -0.5, false);
+    assert!(drive.ahead().z < -0.1, "it turns left: {}", drive.ahead());
+}
+
+#[test]
+fn a_file_refuses_a_driver_of_a_body_that_it_cannot_drive() {
+    for (kind, message) in [
+        ("character", r#"driver: body "box": a character must be kinematic"#),
+        (
+            "vehicle",
+            r#"driver: body "box": a vehicle needs joints whose second body it is, at two places along its x axis"#,
+        ),
+    ] {
+        let text = format!(
+            r#"{{"version": 1, "driver": {{"type": "{kind}", "body": "box"}},
+            "bodies": [{{"name": "box", "shapes": [{{"type": "ball", "radius": 1}}]}}]}}"#
+        );
+        let error = SceneFile::parse(&text).and_then(|file| file.into_scene("box")).expect_err("no scene");
+        assert_eq!(error.to_string(), message);
     }
 }
 

@@ -551,7 +551,7 @@ fn the_schema_describes_every_key() {
     assert_eq!(schema["type"], "object");
     assert_eq!(schema["required"], json!(["version", "bodies"]));
     assert_eq!(schema["additionalProperties"], false);
-    assert_eq!(keys(&schema), "bodies container dt gravity joints name spawners steps version");
+    assert_eq!(keys(&schema), "bodies container driver dt gravity joints name spawners steps version");
     let body = &schema["$defs"]["BodyFile"];
     assert_eq!(
         keys(body),

@@ -7,8 +7,10 @@ use glam::{IVec3, Vec3};
 use super::joint::joint;
 use super::numbers::{checked, finite, lengths, positive, refusal, rotation, unit, zero};
 use super::schema::{
-    AdditionalMassFile, BodyFile, Geometry, LeavesFile, MassFile, MaterialFile, SceneFile, ShapeFile, SpawnerFile,
+    AdditionalMassFile, BodyFile, DriverFile, Geometry, LeavesFile, MassFile, MaterialFile, SceneFile, ShapeFile,
+    SpawnerFile,
 };
+use crate::driver::Driver;
 use crate::scene::Scene;
 use crate::spawner::{Leaves, Spawner};
 use drystone::config::check_step_length;
@@ -40,7 +42,9 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
     }
     let spawner = |(k, s): (usize, &SpawnerFile)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));
     let spawners = file.spawners.iter().enumerate().map(spawner).collect::<Result<_>>()?;
+    let driver = file.driver.map(|driver| self::driver(&driver, &world)).transpose();
     Ok(Scene {
+        driver: driver.map_err(|e| e.within("driver"))?,
         dt,
         container,
         spawners,
@@ -108,6 +112,16 @@ fn body(file: &BodyFile) -> Result<Body> {
     }
     let body = with_mass(body, file)?;
     body.check().map(|()| body)
+}
+
+fn driver(file: &DriverFile, world: &World) -> Result<Driver> {
+    let (DriverFile::Character { body } | DriverFile::Vehicle { body }) = file;
+    let handle = body.find(world)?;
+    let driver = match file {
+        DriverFile::Character { .. } => Driver::character(handle),
+        DriverFile::Vehicle { .. } => Driver::vehicle(handle),
+    };
+    driver.check(world).map_err(|e| e.within(format_args!("body {body}"))).map(|()| driver)
 }
 
 fn spawner(file: &SpawnerFile) -> Result<Spawner> {

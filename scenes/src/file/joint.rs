@@ -9,7 +9,7 @@ use super::numbers::{checked, finite, lengths, positive, rotation, unit};
 use super::schema::{AxisFile, BodyRef, JointFile, JointKind, MotorFile, SpringFile};
 use drystone::stages::error::{ensure, input};
 use drystone::stages::math::rotation as turn;
-use drystone::{Axis, BodyKind, Bounds, Drive, Error, Joint, Result, World};
+use drystone::{Axis, BodyHandle, BodyKind, Bounds, Drive, Error, Joint, Result, World};
 
 impl fmt::Display for BodyRef {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -21,16 +21,17 @@ impl fmt::Display for BodyRef {
 }
 
 impl BodyRef {
-    /// The index of the body in `world`.
-    fn find(&self, world: &World) -> Result<usize> {
+    /// The body in `world`.
+    pub(super) fn find(&self, world: &World) -> Result<BodyHandle> {
         let count = world.bodies.len();
+        let handle = |i: usize| world.bodies.handle(i).unwrap_or(i.into());
         match self {
-            Self::Index(index) if *index < count => Ok(*index),
+            Self::Index(index) if *index < count => Ok(handle(*index)),
             Self::Index(index) => Err(input!("body {index}: must be less than {count}, the number of bodies")),
             Self::Name(name) => {
                 let mut named = (0..count).filter(|&i| world.bodies[i].name == *name);
                 match (named.next(), named.next()) {
-                    (Some(index), None) => Ok(index),
+                    (Some(index), None) => Ok(handle(index)),
                     (None, _) => Err(input!("body {name:?}: no body has that name")),
                     (Some(a), Some(b)) => {
                         Err(input!("body {name:?}: bodies {a} and {b} have that name; give an index"))
@@ -50,12 +51,10 @@ pub(super) fn joint(file: &JointFile, world: &World) -> Result<Joint> {
         _ => return Err(input!("{} bodies: a joint connects one or two", bodies.len())),
     };
     ensure(b != Some(a), || format!("bodies {} and {}: the same body twice", bodies[0], bodies[1]))?;
-    let dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
+    let dynamic = |body: BodyHandle| world.bodies[body].kind == BodyKind::Dynamic;
     let message = "no body of the joint can move: at least one must be dynamic";
     ensure(dynamic(a) || b.is_some_and(dynamic), || message.into())?;
-    let handle = |i: usize| world.bodies.handle(i).unwrap_or(i.into());
-    let between =
-        |anchor_a, anchor_b| Joint { body_b: b.map(handle), ..Joint::to_world(handle(a), anchor_a, anchor_b) };
+    let between = |anchor_a, anchor_b| Joint { body_b: b, ..Joint::to_world(a, anchor_a, anchor_b) };
     let (anchor_a, anchor_b) = match (anchor, anchors) {
         (Some(point), None) => {
             let point = lengths("anchor", *point)?.into();

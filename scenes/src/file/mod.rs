@@ -7,7 +7,7 @@ mod schema;
 mod write;
 
 pub use schema::{
-    AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile,
+    AdditionalMassFile, AxisFile, BodyFile, BodyRef, DriverFile, Geometry, JointFile, JointKind, LeavesFile, MassFile,
     MaterialFile, MotorFile, SceneFile, ShapeFile, SpawnerFile, SpringFile,
 };
 

@@ -19,7 +19,7 @@ use drystone::{BodyKind, CombineRule, Groups};
 ///
 /// ```
 /// use drystone_scenes::{
-///     AdditionalMassFile, AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile,
+///     AdditionalMassFile, AxisFile, BodyFile, BodyRef, DriverFile, Geometry, JointFile, JointKind, LeavesFile, MassFile,
 ///     MaterialFile, MotorFile, SceneFile, ShapeFile, SpawnerFile, SpringFile,
 /// };
 ///
@@ -80,6 +80,27 @@ pub struct SceneFile {
     /// Spawners, which add bodies while the scene runs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spawners: Vec<SpawnerFile>,
+    /// The body that a person drives by keyboard or touch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub driver: Option<DriverFile>,
+}
+
+/// The body that a person drives. Its x axis is forward, and its y axis up.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, tag = "type", rename_all = "snake_case")]
+#[schemars(title = "Driver")]
+pub enum DriverFile {
+    /// A kinematic body that walks.
+    Character {
+        /// The body, of one convex shape.
+        body: BodyRef,
+    },
+    /// A vehicle with motors and steering.
+    Vehicle {
+        /// The chassis. Wheels are the first bodies of the joints to it: a motor of a joint's first angle turns its wheel,
+        /// and limits of its second angle steer it.
+        body: BodyRef,
+    },
 }
 
 /// Adds equal bodies while a scene runs: one before a step, at a regular interval, or later if its place is occupied.

@@ -3,9 +3,10 @@
 use parry3d::shape::TypedShape;
 
 use super::schema::{
-    AxisFile, BodyFile, BodyRef, Geometry, JointFile, JointKind, LeavesFile, MassFile, MaterialFile, MotorFile,
-    SceneFile, ShapeFile, SpawnerFile, SpringFile,
+    AxisFile, BodyFile, BodyRef, DriverFile, Geometry, JointFile, JointKind, LeavesFile, MassFile, MaterialFile,
+    MotorFile, SceneFile, ShapeFile, SpawnerFile, SpringFile,
 };
+use crate::driver::Driver;
 use crate::scene::Scene;
 use crate::spawner::{Leaves, Spawner};
 use drystone::stages::error::{ensure, input};
@@ -36,6 +37,10 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
         bodies.push(body(&world.bodies[i], leaves).map_err(of_body)?);
     }
     let of_spawner = |(k, s): (usize, &Spawner)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));
+    let of_driver = |driver: Driver| {
+        let body = BodyRef::Index(index_of[driver.body().index()]);
+        if driver.can_jump() { DriverFile::Character { body } } else { DriverFile::Vehicle { body } }
+    };
     let of_joint = |(k, j): (usize, &Joint)| joint(j, &index_of).map_err(|e| e.within(format_args!("joints[{k}]")));
     Ok(SceneFile {
         version: 1,
@@ -47,6 +52,7 @@ pub(super) fn file(scene: &Scene) -> Result<SceneFile> {
         bodies,
         joints: world.joints.iter().enumerate().map(of_joint).collect::<Result<_>>()?,
         spawners: scene.spawners.iter().enumerate().map(of_spawner).collect::<Result<_>>()?,
+        driver: scene.driver.filter(|driver| world.body(driver.body()).is_some()).map(of_driver),
     })
 }
 

@@ -45,11 +45,13 @@ impl<C: Constraint, const AS_ONE: bool> Work for Sweep<'_, C, AS_ONE> {
     #[inline(always)]
     fn over<L: Lanes>(&self, groups: Range<usize>) {
         // Each kernel of most sweeps is compiled for its rules: numbers that these rules do not use take no registers.
+        // Without them a page loads 20 kB less, and its steps take 2 to 8 % longer.
+        let is_compiled = C::HAS_POINTS && !AS_ONE && !cfg!(target_arch = "wasm32");
         match self.kernel {
-            BIASED if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(BIASED, groups),
-            RELAX if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(RELAX, groups),
-            BIASED_CUBES if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(BIASED_CUBES, groups),
-            RELAX_CUBES if C::HAS_POINTS && !AS_ONE => self.sweep_all::<L>(RELAX_CUBES, groups),
+            BIASED if is_compiled => self.sweep_all::<L>(BIASED, groups),
+            RELAX if is_compiled => self.sweep_all::<L>(RELAX, groups),
+            BIASED_CUBES if is_compiled => self.sweep_all::<L>(BIASED_CUBES, groups),
+            RELAX_CUBES if is_compiled => self.sweep_all::<L>(RELAX_CUBES, groups),
             kernel => self.sweep_all::<L>(kernel, groups),
         }
     }
