@@ -2,10 +2,9 @@
 
 use glam::{Quat, Vec3};
 
-use drystone::stages::error::ensure;
 use drystone::stages::math::rotation::{about, product, unit};
 use drystone::world::Collider;
-use drystone::{Axis, Body, BodyHandle, BodyKind, Bounds, Character, Drive, Result, Simulation, World};
+use drystone::{Axis, Body, BodyHandle, Bounds, Character, Drive, Result, Simulation, World};
 
 /// Speed of a walk (m/s), angular speed of its turns (rad/s), and speed of a jump (m/s).
 const WALK_SPEED: f32 = 2.5;
@@ -80,22 +79,6 @@ impl Driver {
         }
     }
 
-    /// Refuses a character that is not kinematic, and a vehicle without wheels on two axles.
-    #[cfg(feature = "serde")]
-    pub(crate) fn check(&self, world: &World) -> Result<()> {
-        match self.driven {
-            Driven::Character(Character { body, .. }) => {
-                ensure(world.bodies[body].kind == BodyKind::Kinematic, || "a character must be kinematic".into())
-            }
-            Driven::Vehicle(chassis) => {
-                let (rear, front) = axles(world, chassis);
-                ensure(rear < front, || {
-                    "a vehicle needs joints whose second body it is, at two places along its x axis".into()
-                })
-            }
-        }
-    }
-
     /// Whether it can jump.
     pub fn can_jump(&self) -> bool {
         matches!(self.driven, Driven::Character(_))
@@ -162,7 +145,7 @@ impl Turn {
 }
 
 /// Places of the rear and of the front axle of a chassis along x (m).
-fn axles(world: &World, chassis: BodyHandle) -> (f32, f32) {
+pub(crate) fn axles(world: &World, chassis: BodyHandle) -> (f32, f32) {
     let wheels = || world.joints.iter().filter(|joint| joint.body_b == Some(chassis)).map(|joint| joint.anchor_b.x);
     (wheels().fold(f32::INFINITY, f32::min), wheels().fold(f32::NEG_INFINITY, f32::max))
 }

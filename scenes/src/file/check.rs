@@ -10,7 +10,7 @@ use super::schema::{
     AdditionalMassFile, BodyFile, DriverFile, Geometry, LeavesFile, MassFile, MaterialFile, SceneFile, ShapeFile,
     SpawnerFile,
 };
-use crate::driver::Driver;
+use crate::driver::{Driver, axles};
 use crate::scene::Scene;
 use crate::spawner::{Leaves, Spawner};
 use drystone::config::check_step_length;
@@ -117,11 +117,20 @@ fn body(file: &BodyFile) -> Result<Body> {
 fn driver(file: &DriverFile, world: &World) -> Result<Driver> {
     let (DriverFile::Character { body } | DriverFile::Vehicle { body }) = file;
     let handle = body.find(world)?;
-    let driver = match file {
-        DriverFile::Character { .. } => Driver::character(handle),
-        DriverFile::Vehicle { .. } => Driver::vehicle(handle),
-    };
-    driver.check(world).map_err(|e| e.within(format_args!("body {body}"))).map(|()| driver)
+    let within = |e: Error| e.within(format_args!("body {body}"));
+    match file {
+        DriverFile::Character { .. } => {
+            let walks = world.bodies[handle].kind == BodyKind::Kinematic;
+            ensure(walks, || "a character must be kinematic".into()).map_err(within)?;
+            Ok(Driver::character(handle))
+        }
+        DriverFile::Vehicle { .. } => {
+            let (rear, front) = axles(world, handle);
+            let message = "a vehicle needs joints whose second body it is, at two places along its x axis";
+            ensure(rear < front, || message.into()).map_err(within)?;
+            Ok(Driver::vehicle(handle))
+        }
+    }
 }
 
 fn spawner(file: &SpawnerFile) -> Result<Spawner> {
