@@ -30,6 +30,8 @@ use crate::world::{Body, World};
 pub struct Energy {
     /// The part of its losses that each body can regain (J).
     reserves: Vec<f32>,
+    /// The springs of the caller at the joints of each body.
+    springs: Vec<Held>,
     entries: Vec<Entry>,
     /// The islands of contacts and joints, each with its account.
     islands: Islands,
@@ -48,12 +50,39 @@ pub struct Energy {
 
 impl Clone for Energy {
     fn clone(&self) -> Self {
-        Self { reserves: self.reserves.clone(), ..Self::default() }
+        Self { reserves: self.reserves.clone(), springs: self.springs.clone(), ..Self::default() }
     }
 
     fn clone_from(&mut self, from: &Self) {
         self.reserves.clone_from(&from.reserves);
+        self.springs.clone_from(&from.springs);
         self.are_known = false;
+    }
+}
+
+/// The energy in springs of the caller (J).
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    /// At the end of the step before; infinite if it is not known.
+    energy: f32,
+    /// The part that the springs did not take: it came from angles that jumped from half a turn to the other side.
+    unearned: f32,
+}
+
+impl Held {
+    const UNKNOWN: Self = Self { energy: f32::INFINITY, unearned: 0.0 };
+
+    /// The energy that springs give back in a step in which they hold `before` and `after`. They give back at most what
+    /// they took.
+    fn give_back(&mut self, [before, after]: [f64; 2]) -> f64 {
+        let jump = before - f64::from(self.energy);
+        if jump > COARSE * before {
+            self.unearned += jump as f32;
+        }
+        let earned = |energy: f64| (energy - f64::from(self.unearned)).max(0.0);
+        let given = earned(before) - earned(after);
+        *self = Self { energy: after as f32, unearned: self.unearned.min(after as f32) };
+        given
     }
 }
 
@@ -68,6 +97,8 @@ struct Entry {
     after: f64,
     /// Work of gravity, forces and drives, and of new joints that begin open.
     work: f64,
+    /// Energy of springs of the caller at the start of the step, and at its end.
+    driven: [f64; 2],
     /// The part of earlier losses that can be regained, and the largest such part from this step on.
     reserve: f64,
     slack: f64,
@@ -115,6 +146,7 @@ impl Entry {
         self.before += other.before;
         self.after += other.after;
         self.work += other.work;
+        self.driven = [0, 1].map(|i| self.driven[i] + other.driven[i]);
         self.reserve += other.reserve;
         self.slack += other.slack;
         self.springs += other.springs;
@@ -158,8 +190,18 @@ impl Account {
     /// Energy that constraints added. It is not above 0 if the motion is as slow as rest, or has no more energy than
     /// the springs of contacts can push out.
     fn made(&self) -> f64 {
-        let made = -(self.all.left() + self.released + self.all.rounding);
-        made.min(self.all.after - self.pushed.max(self.all.rest))
+        self.added().min(self.all.after - self.pushed.max(self.all.rest))
+    }
+
+    fn added(&self) -> f64 {
+        -(self.all.left() + self.released + self.all.rounding)
+    }
+
+    /// The share of the energy in springs of the caller that came from no motion: constraints moved bodies, and the
+    /// motion has less energy than the springs took.
+    fn unearned(&self) -> f64 {
+        let held = self.all.driven[1];
+        if held > 0.0 { ((self.added() - self.made()) / held).clamp(0.0, 1.0) } else { 0.0 }
     }
 
     fn is_over(&self) -> bool {
@@ -186,9 +228,14 @@ impl Saved for Energy {
         self.are_known &= !A::READS;
         let bodies = archive.count(self.reserves.len())?;
         self.reserves.resize(bodies, 0.0);
+        self.springs.resize(bodies, Held::UNKNOWN);
         archive.runs(bodies, |i, archive| {
             self.reserves[i].walk(archive)?;
-            ensure(self.reserves[i] >= 0.0, || format!("body {i} can regain {} J", self.reserves[i]))
+            ensure(self.reserves[i] >= 0.0, || format!("body {i} can regain {} J", self.reserves[i]))?;
+            let Held { energy, unearned } = &mut self.springs[i];
+            energy.walk(archive)?;
+            unearned.walk(archive)?;
+            ensure(*energy >= 0.0 && *unearned >= 0.0, || format!("springs of body {i} hold {energy} J, {unearned} J"))
         })
     }
 }
@@ -202,6 +249,7 @@ impl Energy {
     /// Updates bodies that were added or removed, or that changed kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
         self.reserves.resize(world.bodies.len(), 0.0);
+        self.springs.resize(world.bodies.len(), Held::UNKNOWN);
         for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
             self.reserves[i] = 0.0;
             self.fresh.push(i);
@@ -224,7 +272,7 @@ impl Energy {
     }
 
     /// Applies the law to the step of `dt` seconds that `problem` has run, after [`Self::note_jointed`]. `world` is the
-    /// world before the step.
+    /// world before the step. `is_teleported` says which bodies the caller moved before it: by that, springs took energy.
     pub fn hold(
         &mut self,
         world: &World,
@@ -232,9 +280,11 @@ impl Energy {
         effort: &mut Effort,
         config: &SolverConfig,
         dt: f32,
+        is_teleported: impl Fn(usize) -> bool,
     ) -> Taken {
         self.fresh.extend(self.reserves.len()..world.bodies.len());
         self.reserves.resize(world.bodies.len(), 0.0);
+        self.springs.resize(world.bodies.len(), Held::UNKNOWN);
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
         let entry = |(i, body): (usize, &Body)| Entry {
             reserve: self.reserves[i].into(),
@@ -247,8 +297,23 @@ impl Energy {
         // The first rounding of a position may be a gain.
         self.fresh.iter().for_each(|&i| self.entries[i].reserve = self.entries[i].reserve.max(self.entries[i].rest));
         springs::add_springs_at_start(&mut self.entries, problem, world, config, &self.fresh, substep);
-        self.fresh.clear();
+        self.fresh.drain(..).for_each(|i| self.springs[i] = Held::UNKNOWN);
         springs::add_work_of_drives(&mut self.entries, problem, world, substep);
+        for &row in problem.rows_of(&problem.joint_colors()) {
+            let ends = ends(&problem.joints[row as usize]).map(|end| end as usize);
+            if ends.into_iter().any(&is_teleported) {
+                for held in ends.into_iter().filter(|&i| i < world.bodies.len()) {
+                    self.springs[held] = Held::UNKNOWN;
+                }
+            }
+        }
+        for (entry, held) in self.entries.iter_mut().zip(&mut self.springs) {
+            if entry.driven == [0.0; 2] {
+                *held = Held::UNKNOWN;
+            } else {
+                entry.work += held.give_back(entry.driven);
+            }
+        }
         if self.entries.iter().all(|entry| entry.left() + entry.rounding >= entry.springs) {
             let all = self.reserves.iter_mut().zip(&self.entries);
             all.for_each(|(reserve, entry)| *reserve = entry.kept(0.0) as f32);
@@ -379,9 +444,13 @@ impl Energy {
         self.members.sort_unstable();
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let account = &mut self.accounts[members[0].0 as usize];
-            let over = account.made();
+            let (over, unearned) = (account.made(), account.unearned());
             let Account { all, released, is_held, is_refused, .. } = account;
             let members = members.iter().map(|(_, body)| *body as usize);
+            for i in members.clone() {
+                let (held, energy) = (&mut self.springs[i], self.entries[i].driven[1]);
+                held.unearned = (f64::from(held.unearned) + unearned * energy).min(energy) as f32;
+            }
             taken.energy += if over.is_finite() { over } else { all.after };
             let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
             let is_whole = over.is_finite()

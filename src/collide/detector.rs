@@ -212,6 +212,11 @@ impl Detector {
             .for_each(|&i| self.left[i] = LastPose::of(&world.bodies[i]));
     }
 
+    /// Whether the caller moved a body since [`Self::note_left`].
+    pub fn is_teleported(&self, world: &World, i: usize) -> bool {
+        world.bodies.get(i).zip(self.left.get(i)).is_some_and(|(body, left)| LastPose::of(body) != *left)
+    }
+
     /// Ends the contacts of bodies that the caller moved since [`Self::note_left`].
     pub fn end_teleported(&mut self, world: &World) {
         if let Some(teleports) = Teleports::find(&self.left, &world.bodies) {

@@ -126,7 +126,8 @@ pub(super) fn add_work_of_drives(
                 let places = [0, 1].map(|i| axis.gap + motions[i].1.moved - 0.5 * h * speeds[i]);
                 let stiffness = f64::from(stiffness(of_world, number, world));
                 let [before, after] = places.map(|place| held_by_drive(stiffness, axis.max_impulse / h, place));
-                work += before - after;
+                let held = &mut entries[body as usize].driven;
+                *held = [held[0] + before, held[1] + after];
             } else {
                 let impulse = axis_impulse(problem, k, &problem.joint_totals);
                 work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);

@@ -505,10 +505,10 @@ impl Stages {
     /// Stores poses and velocities in the world, and removes energy that constraints added.
     pub fn store(&mut self, world: &mut World, dt: f32) -> Taken {
         self.note_events(world);
-        let Self { energy, effort, key, problem, thrown, .. } = self;
+        let Self { energy, effort, key, problem, thrown, detector, .. } = self;
         problem::find_thrown(problem, thrown);
         problem::follow_parabolas(world, effort, [energy.note_jointed(problem), thrown], dt, problem);
-        let taken = energy.hold(world, problem, effort, &key.config, dt);
+        let taken = energy.hold(world, problem, effort, &key.config, dt, |i| detector.is_teleported(world, i));
         problem::store(&self.problem, self.sleep.asleep(), world);
         let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());
         // The joints are measured within the step. They do not hold the energy of their springs at its end.

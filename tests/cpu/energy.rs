@@ -163,6 +163,36 @@ fn a_spring_beside_centers_of_mass_keeps_energy_and_angular_momentum() {
     }
 }
 
+/// A bar on a hinge with a spring of 1 Hz, which the caller turns by 1 rad or gives another target: it swings by 1 rad.
+#[test]
+fn a_spring_that_the_caller_strains_gives_that_energy() {
+    for is_turned in [true, false] {
+        let mut world = World::new();
+        world.gravity = Vec3::ZERO;
+        let bar = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.1)));
+        let joint =
+            world.insert_joint(Joint::to_world(bar, Vec3::ZERO, Vec3::ZERO).hinge(Vec3::Z).spring(0.0, 1.0, 0.0));
+        let mut simulation = started(world);
+        (0..10).for_each(|_| drop(simulation.step(DT).expect("a step")));
+        let center = if is_turned {
+            simulation.world.bodies[bar].rotation = Quat::from_rotation_z(1.0);
+            0.0
+        } else {
+            let joint = simulation.world.joint_mut(joint).expect("a joint");
+            joint.angular[0] = joint.angular[0].spring(1.0, 1.0, 0.0, f32::MAX);
+            1.0
+        };
+        let mut range = [f32::INFINITY, f32::NEG_INFINITY];
+        for _ in 0..90 {
+            simulation.step(DT).expect("a step");
+            let axis = simulation.world.bodies[bar].rotation * Vec3::X;
+            let angle = axis.y.atan2(axis.x) - center;
+            range = [range[0].min(angle), range[1].max(angle)];
+        }
+        assert!(range[0] < -0.95 && range[1] > 0.95, "turned: {is_turned}, from {range:?} rad");
+    }
+}
+
 /// The law never acts on worlds that make no energy: pendulums, hinges, towers, belts, drums, motors, springs.
 #[test]
 fn scenes_that_make_no_energy_lose_none_to_the_law() {

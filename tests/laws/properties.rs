@@ -7,11 +7,12 @@
 use std::fmt::Write;
 
 use drystone::preset::Preset;
-use drystone::{Backend, Cpu, Reference, SolverConfig};
+use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig, World};
 use drystone_scenes::SceneFile;
 use rayon::prelude::*;
 
 use crate::laws::draw::{Drawn, Family, Kind};
+use crate::laws::measures::{Mechanics, Springs};
 use crate::laws::run::{Case, Verdict, run_on};
 
 /// Worlds of each group.
@@ -112,6 +113,24 @@ fn bodies_that_bounce_gain_no_energy() {
     group().keeps(&["finite", "energy", "momentum"]);
     Group { one_in: 2, rate: 30, ..group() }.keeps(&["finite", "energy", "momentum"]);
     Group { one_in: 2, rate: 240, ..group() }.preset(Preset::Fast).keeps(&["finite", "energy", "momentum"]);
+}
+
+/// Where the axis of a ball joint swings through half a turn, its twist jumps, and the energy in springs of the caller
+/// with it. The bodies took up to twenty times the energy of these worlds from such jumps.
+#[test]
+fn springs_give_back_at_most_what_they_took() {
+    for (collides, seed) in [(false, 4), (false, 56), (true, 4), (true, 14)] {
+        let drawn = Drawn { family: Family::Springs, kind: Kind::Ball, collides, seed };
+        let motion = |world: &World| Mechanics::of(world).kinetic + Mechanics::of(world).potential;
+        let world = drawn.scene().world;
+        let most = motion(&world) + Springs::of(&world).energy;
+        let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Cpu::new())).expect("a world");
+        for step in 0..240 {
+            simulation.step(1.0 / 60.0).expect("a step");
+            let motion = motion(&simulation.world);
+            assert!(motion < 1.001 * most, "{drawn}, step {step}: {motion} J of {most}");
+        }
+    }
 }
 
 #[test]
