@@ -5,7 +5,7 @@ use crate::error::{Error, Result, ensure, input};
 use crate::panics;
 
 /// The version of the content. It grows with every change of a saved value.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 /// Size of the header (bytes): the mark, the version, and the hash of the content.
 const HEADER: usize = 8 + 4 + 8;
 

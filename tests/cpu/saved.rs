@@ -350,7 +350,7 @@ fn bytes_that_are_damaged_or_cut_short_are_refused_in_one_line() {
     let mut other = bytes.clone();
     other[8] += 1;
     let line = refusal(&other);
-    assert!(line.contains("version 9") && line.contains("reads version 8"), "{line}");
+    assert!(line.contains("version 10") && line.contains("reads version 9"), "{line}");
     assert!(refusal(b"a file of another program").contains("these bytes are not a saved run"));
 }
 
