@@ -31,7 +31,7 @@ pub struct Energy {
     /// The part of its losses that each body can regain (J).
     reserves: Vec<f32>,
     /// The springs of the caller at the joints of each body.
-    springs: Vec<Held>,
+    drive_springs: Vec<DriveSprings>,
     entries: Vec<Entry>,
     /// The islands of contacts and joints, each with its account.
     islands: Islands,
@@ -50,38 +50,40 @@ pub struct Energy {
 
 impl Clone for Energy {
     fn clone(&self) -> Self {
-        Self { reserves: self.reserves.clone(), springs: self.springs.clone(), ..Self::default() }
+        Self { reserves: self.reserves.clone(), drive_springs: self.drive_springs.clone(), ..Self::default() }
     }
 
     fn clone_from(&mut self, from: &Self) {
         self.reserves.clone_from(&from.reserves);
-        self.springs.clone_from(&from.springs);
+        self.drive_springs.clone_from(&from.drive_springs);
         self.are_known = false;
     }
 }
 
 /// The energy in springs of the caller (J).
-#[derive(Clone, Copy, Debug, Default)]
-struct Held {
+#[derive(Clone, Copy, Debug)]
+struct DriveSprings {
     /// At the end of the step before; infinite if it is not known.
     energy: f32,
-    /// The part that the springs did not take: it came from angles that jumped from half a turn to the other side.
+    /// The part that came from no motion: an angle jumped from half a turn to the other side, or constraints strained a
+    /// spring by more than the motion had.
     unearned: f32,
 }
 
-impl Held {
+impl DriveSprings {
     const UNKNOWN: Self = Self { energy: f32::INFINITY, unearned: 0.0 };
 
     /// The energy that springs give back in a step in which they hold `before` and `after`. They give back at most what
     /// they took.
     fn give_back(&mut self, [before, after]: [f64; 2]) -> f64 {
+        self.unearned = self.unearned.min(self.energy);
         let jump = before - f64::from(self.energy);
         if jump > COARSE * before {
             self.unearned += jump as f32;
         }
         let earned = |energy: f64| (energy - f64::from(self.unearned)).max(0.0);
         let given = earned(before) - earned(after);
-        *self = Self { energy: after as f32, unearned: self.unearned.min(after as f32) };
+        self.energy = after as f32;
         given
     }
 }
@@ -98,7 +100,7 @@ struct Entry {
     /// Work of gravity, forces and drives, and of new joints that begin open.
     work: f64,
     /// Energy of springs of the caller at the start of the step, and at its end.
-    driven: [f64; 2],
+    drive_springs: [f64; 2],
     /// The part of earlier losses that can be regained, and the largest such part from this step on.
     reserve: f64,
     slack: f64,
@@ -146,7 +148,7 @@ impl Entry {
         self.before += other.before;
         self.after += other.after;
         self.work += other.work;
-        self.driven = [0, 1].map(|i| self.driven[i] + other.driven[i]);
+        self.drive_springs = [0, 1].map(|i| self.drive_springs[i] + other.drive_springs[i]);
         self.reserve += other.reserve;
         self.slack += other.slack;
         self.springs += other.springs;
@@ -200,7 +202,7 @@ impl Account {
     /// The share of the energy in springs of the caller that came from no motion: constraints moved bodies, and the
     /// motion has less energy than the springs took.
     fn unearned(&self) -> f64 {
-        let held = self.all.driven[1];
+        let held = self.all.drive_springs[1];
         if held > 0.0 { ((self.added() - self.made()) / held).clamp(0.0, 1.0) } else { 0.0 }
     }
 
@@ -227,12 +229,11 @@ impl Saved for Energy {
     fn walk<A: Archive>(&mut self, archive: &mut A) -> Result<()> {
         self.are_known &= !A::READS;
         let bodies = archive.count(self.reserves.len())?;
-        self.reserves.resize(bodies, 0.0);
-        self.springs.resize(bodies, Held::UNKNOWN);
+        self.make_room(bodies);
         archive.runs(bodies, |i, archive| {
             self.reserves[i].walk(archive)?;
             ensure(self.reserves[i] >= 0.0, || format!("body {i} can regain {} J", self.reserves[i]))?;
-            let Held { energy, unearned } = &mut self.springs[i];
+            let DriveSprings { energy, unearned } = &mut self.drive_springs[i];
             energy.walk(archive)?;
             unearned.walk(archive)?;
             ensure(*energy >= 0.0 && *unearned >= 0.0, || format!("springs of body {i} hold {energy} J, {unearned} J"))
@@ -246,10 +247,14 @@ impl Energy {
         self.are_known = false;
     }
 
+    fn make_room(&mut self, bodies: usize) {
+        self.reserves.resize(bodies, 0.0);
+        self.drive_springs.resize(bodies, DriveSprings::UNKNOWN);
+    }
+
     /// Updates bodies that were added or removed, or that changed kind, groups or shapes.
     pub fn follow_bodies(&mut self, world: &World, changed: &[usize]) {
-        self.reserves.resize(world.bodies.len(), 0.0);
-        self.springs.resize(world.bodies.len(), Held::UNKNOWN);
+        self.make_room(world.bodies.len());
         for &i in changed.iter().filter(|&&i| i < world.bodies.len()) {
             self.reserves[i] = 0.0;
             self.fresh.push(i);
@@ -283,8 +288,7 @@ impl Energy {
         is_teleported: impl Fn(usize) -> bool,
     ) -> Taken {
         self.fresh.extend(self.reserves.len()..world.bodies.len());
-        self.reserves.resize(world.bodies.len(), 0.0);
-        self.springs.resize(world.bodies.len(), Held::UNKNOWN);
+        self.make_room(world.bodies.len());
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
         let entry = |(i, body): (usize, &Body)| Entry {
             reserve: self.reserves[i].into(),
@@ -297,23 +301,9 @@ impl Energy {
         // The first rounding of a position may be a gain.
         self.fresh.iter().for_each(|&i| self.entries[i].reserve = self.entries[i].reserve.max(self.entries[i].rest));
         springs::add_springs_at_start(&mut self.entries, problem, world, config, &self.fresh, substep);
-        self.fresh.drain(..).for_each(|i| self.springs[i] = Held::UNKNOWN);
         springs::add_work_of_drives(&mut self.entries, problem, world, substep);
-        for &row in problem.rows_of(&problem.joint_colors()) {
-            let ends = ends(&problem.joints[row as usize]).map(|end| end as usize);
-            if ends.into_iter().any(&is_teleported) {
-                for held in ends.into_iter().filter(|&i| i < world.bodies.len()) {
-                    self.springs[held] = Held::UNKNOWN;
-                }
-            }
-        }
-        for (entry, held) in self.entries.iter_mut().zip(&mut self.springs) {
-            if entry.driven == [0.0; 2] {
-                *held = Held::UNKNOWN;
-            } else {
-                entry.work += held.give_back(entry.driven);
-            }
-        }
+        self.add_work_of_drive_springs(problem, is_teleported);
+        self.fresh.clear();
         if self.entries.iter().all(|entry| entry.left() + entry.rounding >= entry.springs) {
             let all = self.reserves.iter_mut().zip(&self.entries);
             all.for_each(|(reserve, entry)| *reserve = entry.kept(0.0) as f32);
@@ -335,6 +325,24 @@ impl Energy {
             *reserve = (share * self.entries[i].slack).max(0.0) as f32;
         }
         taken
+    }
+
+    /// Adds the energy that springs of the caller give back. The caller strains them if it moves a body or changes a joint.
+    fn add_work_of_drive_springs(&mut self, problem: &StepProblem, is_teleported: impl Fn(usize) -> bool) {
+        let is_strained = |i: &usize| is_teleported(*i) || self.fresh.binary_search(i).is_ok();
+        for &row in problem.rows_of(&problem.joint_colors()) {
+            let ends = ends(&problem.joints[row as usize]).map(|end| end as usize);
+            if ends.iter().any(is_strained) {
+                for i in ends.into_iter().filter(|&i| i < self.entries.len()) {
+                    self.drive_springs[i] = DriveSprings::UNKNOWN;
+                }
+            }
+        }
+        for (entry, springs) in self.entries.iter_mut().zip(&mut self.drive_springs) {
+            if entry.drive_springs != [0.0; 2] {
+                entry.work += springs.give_back(entry.drive_springs);
+            }
+        }
     }
 
     /// Finds the islands of bodies that contacts and joints connect.
@@ -447,15 +455,19 @@ impl Energy {
             let (over, unearned) = (account.made(), account.unearned());
             let Account { all, released, is_held, is_refused, .. } = account;
             let members = members.iter().map(|(_, body)| *body as usize);
-            for i in members.clone() {
-                let (held, energy) = (&mut self.springs[i], self.entries[i].driven[1]);
-                held.unearned = (f64::from(held.unearned) + unearned * energy).min(energy) as f32;
-            }
             taken.energy += if over.is_finite() { over } else { all.after };
             let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
             let is_whole = over.is_finite()
                 && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into())
                 && brake(world, problem, members.clone(), [over, all.after], from_start.as_ref());
+            for i in members.clone() {
+                let (springs, [at_start, at_end]) = (&mut self.drive_springs[i], self.entries[i].drive_springs);
+                if is_whole {
+                    springs.unearned = (f64::from(springs.unearned) + unearned * at_end).min(at_end) as f32;
+                } else {
+                    springs.energy = at_start as f32;
+                }
+            }
             if !is_whole {
                 taken.refused += 1;
                 *is_refused = true;

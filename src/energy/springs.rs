@@ -126,8 +126,8 @@ pub(super) fn add_work_of_drives(
                 let places = [0, 1].map(|i| axis.gap + motions[i].1.moved - 0.5 * h * speeds[i]);
                 let stiffness = f64::from(stiffness(of_world, number, world));
                 let [before, after] = places.map(|place| held_by_drive(stiffness, axis.max_impulse / h, place));
-                let held = &mut entries[body as usize].driven;
-                *held = [held[0] + before, held[1] + after];
+                let [at_start, at_end] = &mut entries[body as usize].drive_springs;
+                (*at_start, *at_end) = (*at_start + before, *at_end + after);
             } else {
                 let impulse = axis_impulse(problem, k, &problem.joint_totals);
                 work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);

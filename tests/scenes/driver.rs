@@ -13,7 +13,10 @@ struct Drive {
 
 impl Drive {
     fn on(backend: Box<dyn Backend>, name: &str) -> Self {
-        let Scene { world, driver, dt, .. } = Scene::find(name, &[]).expect("a scene");
+        Self::through(Scene::find(name, &[]).expect("a scene"), backend)
+    }
+
+    fn through(Scene { world, driver, dt, .. }: Scene, backend: Box<dyn Backend>) -> Self {
         let simulation = Simulation::with(world, SolverConfig::default(), backend).expect("a simulation");
         Self { simulation, driver: driver.expect("a driver"), dt }
     }
@@ -99,9 +102,7 @@ fn the_same_inputs_give_the_same_bits() {
 fn a_scene_file_keeps_its_driver() {
     for name in ["course", "vehicle"] {
         let run = |scene: Scene| {
-            let simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()));
-            let (simulation, driver) = (simulation.expect("a simulation"), scene.driver.expect("a driver"));
-            let mut drive = Drive { simulation, driver, dt: scene.dt };
+            let mut drive = Drive::through(scene, Box::new(Reference::<f32>::new()));
             drive.steps(30, 1.0, 0.5, false);
             drive.simulation.hash()
         };
@@ -146,9 +147,7 @@ fn a_file_has_a_vehicle_of_any_size() {
         &list(&joint)[1..]
     );
     let scene = SceneFile::parse(&text).and_then(|file| file.into_scene("cart")).expect("a scene");
-    let simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()));
-    let (simulation, driver) = (simulation.expect("a simulation"), scene.driver.expect("a driver"));
-    let mut drive = Drive { simulation, driver, dt: scene.dt };
+    let mut drive = Drive::through(scene, Box::new(Reference::<f32>::new()));
     drive.steps(180, 0.5, 0.0, false);
     let Vec3 { x: speed, .. } = drive.body().linear_velocity;
     // Half of the largest speed, 10 m/s: the radius of each wheel is its own.

@@ -42,12 +42,12 @@ pub(super) fn scene(file: SceneFile, name: &str) -> Result<Scene> {
     }
     let spawner = |(k, s): (usize, &SpawnerFile)| spawner(s).map_err(|e| e.within(format_args!("spawners[{k}]")));
     let spawners = file.spawners.iter().enumerate().map(spawner).collect::<Result<_>>()?;
-    let driver = file.driver.map(|driver| self::driver(&driver, &world)).transpose();
+    let driver = file.driver.map(|file| driver(&file, &world)).transpose().map_err(|e| e.within("driver"))?;
     Ok(Scene {
-        driver: driver.map_err(|e| e.within("driver"))?,
         dt,
         container,
         spawners,
+        driver,
         leaving,
         ..Scene::new(file.name.unwrap_or_else(|| name.to_owned()), world, file.steps)
     })
