@@ -112,6 +112,8 @@ struct Entry {
     rounding: f64,
     /// The longest lever of a joint (m).
     lever: f64,
+    /// Whether the caller moved an end of a joint or changed a joint. Bodies then move as far as the joint is open.
+    is_strained: bool,
 }
 
 /// Common motion of some bodies: mass (kg), momentum before and after (kg m/s), force (N), and mass times displacement
@@ -155,6 +157,7 @@ impl Entry {
         self.rest += other.rest;
         self.rounding += other.rounding;
         self.lever = self.lever.max(other.lever);
+        self.is_strained |= other.is_strained;
     }
 
     /// Subtracts the common motion of all bodies, which no internal impulse changes.
@@ -181,6 +184,8 @@ struct Account {
     /// Energy that the springs of its contacts gave back, and energy that they held at the start of the step (J).
     released: f64,
     pushed: f64,
+    /// The number of its contacts with an overlap.
+    overlaps: u32,
     /// Whether anything outside the island holds it.
     is_held: bool,
     is_refused: bool,
@@ -199,11 +204,15 @@ impl Account {
         -(self.all.left() + self.released + self.all.rounding)
     }
 
-    /// The share of the energy in springs of the caller that came from no motion: constraints moved bodies, and the
-    /// motion has less energy than the springs took.
+    /// Energy that constraints added and that the motion does not have: they moved bodies against forces and springs.
+    fn unpaid(&self) -> f64 {
+        self.added() - self.made()
+    }
+
+    /// The share of the energy in springs of the caller that came from no motion.
     fn unearned(&self) -> f64 {
         let held = self.all.drive_springs[1];
-        if held > 0.0 { ((self.added() - self.made()) / held).clamp(0.0, 1.0) } else { 0.0 }
+        if held > 0.0 { (self.unpaid() / held).clamp(0.0, 1.0) } else { 0.0 }
     }
 
     fn is_over(&self) -> bool {
@@ -301,7 +310,7 @@ impl Energy {
         // The first rounding of a position may be a gain.
         self.fresh.iter().for_each(|&i| self.entries[i].reserve = self.entries[i].reserve.max(self.entries[i].rest));
         springs::add_springs_at_start(&mut self.entries, problem, world, config, &self.fresh, substep);
-        springs::add_work_of_drives(&mut self.entries, problem, world, substep);
+        springs::add_work_of_drives(&mut self.entries, problem, world, dt.into(), substep);
         self.add_work_of_drive_springs(problem, is_teleported);
         self.fresh.clear();
         if self.entries.iter().all(|entry| entry.left() + entry.rounding >= entry.springs) {
@@ -333,7 +342,9 @@ impl Energy {
         for &row in problem.rows_of(&problem.joint_colors()) {
             let ends = ends(&problem.joints[row as usize]).map(|end| end as usize);
             if ends.iter().any(is_strained) {
-                for i in ends.into_iter().filter(|&i| i < self.entries.len()) {
+                for i in ends {
+                    let Some(entry) = self.entries.get_mut(i) else { continue };
+                    entry.is_strained = true;
                     self.drive_springs[i] = DriveSprings::UNKNOWN;
                 }
             }
@@ -415,17 +426,20 @@ impl Energy {
         free.for_each(|account| account.all.leave_out(account.common));
     }
 
-    /// Adds the energy that the springs of contacts between bodies without joints gave back, in islands that gained
-    /// energy. Joints and contacts can push against each other without an end, so springs of jointed bodies give nothing.
+    /// Counts overlaps, and adds the energy that the springs of contacts between bodies without joints gave back, in islands
+    /// that gained energy. Joints and contacts can push against each other without an end, so springs of jointed bodies give nothing.
     fn add_released(&mut self, problem: &StepProblem, effort: &Effort) {
         for contact in problem.swept_contacts() {
             let [a, b] = [contact.body_a as usize, contact.body_b as usize];
-            if self.jointed[a] || self.jointed[b] {
-                continue;
-            }
             let body = if can_move(problem, contact.body_a) { a } else { b };
             let account = &mut self.accounts[self.numbers[body] as usize];
-            if account.all.left() < 0.0 {
+            if account.all.left() >= 0.0 {
+                continue;
+            }
+            let first = contact.first_point as usize;
+            let mut points = problem.points[first..first + contact.point_count as usize].iter();
+            account.overlaps += u32::from(points.any(|point| point.separation < 0.0));
+            if !self.jointed[a] && !self.jointed[b] {
                 let [before, after] =
                     springs::held_by_contact(problem, contact, &problem.blocks[effort.block_of(body)].substep);
                 account.released += before - after;
@@ -452,12 +466,16 @@ impl Energy {
         self.members.sort_unstable();
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let account = &mut self.accounts[members[0].0 as usize];
-            let (over, unearned) = (account.made(), account.unearned());
-            let Account { all, released, is_held, is_refused, .. } = account;
+            let (over, unpaid, unearned) = (account.made(), account.unpaid(), account.unearned());
+            let Account { all, released, overlaps, is_held, is_refused, .. } = account;
             let members = members.iter().map(|(_, body)| *body as usize);
+            // Stabilization lifts bodies at `push_limit` at most, each overlap those that lie on it.
+            let weight: f64 = members.clone().map(|i| weight(world, problem, i)).sum();
+            let lift = weight * f64::from(config.push_limit * dt) * f64::from(*overlaps + 1);
             taken.energy += if over.is_finite() { over } else { all.after };
             let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
             let is_whole = over.is_finite()
+                && (unpaid <= lift || all.is_strained)
                 && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into())
                 && brake(world, problem, members.clone(), [over, all.after], from_start.as_ref());
             for i in members.clone() {
@@ -587,6 +605,11 @@ fn common(body: &Body, i: usize, problem: &StepProblem, lag: f64) -> Common {
     let [v, v_0] = [Vec3::from(row.v), body.linear_velocity].map(|v| v.as_dvec3());
     let force = mass * Vec3::from(problem.masses[i].acceleration).as_dvec3();
     Common { mass, momenta: [mass * v_0, mass * v], force, moved: mass * way(body, row, [v_0, v], lag) }
+}
+
+/// The size of the weight and forces of a body (N).
+fn weight(world: &World, problem: &StepProblem, body: usize) -> f64 {
+    f64::from(world.bodies[body].mass.mass * Vec3::from(problem.masses[body].acceleration).length())
 }
 
 /// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of them

@@ -63,6 +63,8 @@ struct End {
     against: Vec3,
     /// The velocity of that surface (m/s).
     pace: Vec3,
+    /// A body of the set that joints hold together with this one.
+    island: u32,
 }
 
 /// The path that a body took.
@@ -96,20 +98,37 @@ impl Detector {
 
     /// Stops bodies that moved far at the place where their path enters fixed geometry, after a step of `dt` seconds
     /// that led to the poses in `world`. Returns the bodies that moved far, and the stopped bodies that joints hold. A
-    /// stopped body keeps its velocity, minus the change by gravity over the rest of the step.
+    /// stopped body keeps its velocity, minus the change by gravity over the rest of the step. Constraints may have moved
+    /// it further down than it would have fallen; then it also loses the work of gravity on the way that it did not take.
     pub fn hold(&mut self, world: &mut World, dt: f32, activity: &[Activity]) -> (Vec<u32>, Vec<usize>) {
         let far = self.far_bodies(world, activity);
         let is_dynamic = |&&i: &&u32| world.bodies[i as usize].kind == BodyKind::Dynamic;
         let ends = far.par_iter().filter(is_dynamic).filter_map(|&i| Some((i, self.end(world, i, dt)?)));
         let ends = self.hold_joints(world, ends.collect(), dt);
-        for &(i, End { at: Station { center, rotation }, share, against, pace }) in &ends {
-            let body = &mut world.bodies[i as usize];
+        // Kinetic energy, and energy gained by the stop, of bodies that joints hold together (J).
+        let mut energies: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
+        for &(i, End { at: Station { center, rotation }, share, against, pace, island }) in &ends {
+            let (body, pull) = (&mut world.bodies[i as usize], self.moving[i as usize].pull);
+            let undone = (body.mass.mass * pull).dot(body.center_of_mass() - center);
+            let before = body.kinetic_energy() - f64::from(undone);
             body.linear_velocity -= (body.linear_velocity - pace).dot(against).min(0.0) * against;
             // In the frame of the body the spin is unchanged, and so is the energy.
             body.angular_velocity = rotation * (body.rotation.inverse() * body.angular_velocity);
             body.rotation = rotation;
             body.position = center - rotation * body.mass.center;
-            body.linear_velocity -= (1.0 - share) * dt * self.moving[i as usize].pull;
+            body.linear_velocity -= (1.0 - share) * dt * pull;
+            let after = body.kinetic_energy();
+            let [kinetic, gained] = energies.entry(island).or_default();
+            (*kinetic, *gained) = (*kinetic + after, *gained + after - before);
+        }
+        for (i, End { island, .. }) in &ends {
+            let [kinetic, gained] = energies[island];
+            if gained > 0.0 {
+                let scale = (1.0 - gained / kinetic).max(0.0).sqrt() as f32;
+                let body = &mut world.bodies[*i as usize];
+                body.linear_velocity *= scale;
+                body.angular_velocity *= scale;
+            }
         }
         let tied = ends.iter().map(|(i, _)| *i as usize).filter(|&i| self.moving[i].tied == 1.0);
         (far, tied.collect())
@@ -141,8 +160,11 @@ impl Detector {
         let held = (0..).zip(roots).filter(|&(i, _)| is_tied(i) && is_dynamic(i as usize));
         ends.extend(held.filter_map(|(i, root)| {
             let share = first[*root as usize]?;
-            let end = || End { at: self.way_of(world, i, dt).at(share), share, against: Vec3::ZERO, pace: Vec3::ZERO };
-            Some((i, own.get(&i).filter(|end| end.share == share).copied().unwrap_or_else(end)))
+            let at = |share| self.way_of(world, i, dt).at(share);
+            let end = own.get(&i).filter(|end| end.share == share).copied();
+            let end =
+                end.unwrap_or_else(|| End { at: at(share), share, against: Vec3::ZERO, pace: Vec3::ZERO, island: i });
+            Some((i, End { island: *root, ..end }))
         }));
         ends
     }
@@ -159,7 +181,8 @@ impl Detector {
             let center = center + (1.0 - time) * other.shift;
             way = BodyPath::between(way.begin, Station { center, rotation }, time * way.turn);
             let against = if is_deep { normal } else { Vec3::ZERO };
-            end = Some(End { at: Station { center, rotation }, share: time, against, pace: other.shift / dt });
+            let at = Station { center, rotation };
+            end = Some(End { at, share: time, against, pace: other.shift / dt, island: i });
         }
         match self.first_on(world, i, &way, dt, false) {
             Some((Impact { time, normal, is_deep }, _)) => Some(End {
@@ -167,6 +190,7 @@ impl Detector {
                 share: end.map_or(time, |end| time * end.share),
                 against: if is_deep { normal } else { Vec3::ZERO },
                 pace: Vec3::ZERO,
+                island: i,
             }),
             None => end,
         }

@@ -72,11 +72,13 @@ pub(super) fn add_springs_at_start(
 }
 
 /// Adds the work of driven bodies and of the drives of joints. The work of a motor is its impulse times the faster of
-/// the two speeds of its axis. A spring of the caller gives back the energy of its deflection.
+/// the two speeds of its axis, and at most its largest power. A spring of the caller gives back the energy of its
+/// deflection.
 pub(super) fn add_work_of_drives(
     entries: &mut [Entry],
     problem: &StepProblem,
     world: &World,
+    dt: f64,
     substep: impl Fn(usize) -> f64,
 ) {
     let driver = |body: u32| world.bodies.get(body as usize).filter(|b| b.kind != BodyKind::Dynamic && b.is_driven());
@@ -130,7 +132,8 @@ pub(super) fn add_work_of_drives(
                 (*at_start, *at_end) = (*at_start + before, *at_end + after);
             } else {
                 let impulse = axis_impulse(problem, k, &problem.joint_totals);
-                work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max);
+                let most = axis.max_impulse / substep(body as usize) * dt * axis.speed.abs();
+                work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max).min(most);
             }
         }
         entries[body as usize].work += work;
