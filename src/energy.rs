@@ -21,7 +21,7 @@ use crate::error::{Result, ensure};
 use crate::graph::Islands;
 use crate::math::rotation::{product, unit};
 use crate::problem::damping::Decay;
-use crate::problem::{BodyRow, JointImpulseRow, JointRow, StepProblem, pose_after};
+use crate::problem::{BodyRow, JointImpulseRow, JointRow, MassRow, StepProblem, pose_after};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
 
@@ -470,7 +470,7 @@ impl Energy {
             let Account { all, released, overlaps, is_held, is_refused, .. } = account;
             let members = members.iter().map(|(_, body)| *body as usize);
             // Stabilization lifts bodies at `push_limit` at most, each overlap those that lie on it.
-            let weight: f64 = members.clone().map(|i| weight(world, problem, i)).sum();
+            let weight: f64 = members.clone().map(|i| weight(&problem.masses[i])).sum();
             let lift = weight * f64::from(config.push_limit * dt) * f64::from(*overlaps + 1);
             taken.energy += if over.is_finite() { over } else { all.after };
             let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
@@ -537,8 +537,7 @@ fn add_levers(entries: &mut [Entry], problem: &StepProblem) {
         let arms = [joint.r_a, joint.r_b].map(|arm| f64::from(Vec3::from(arm).length()));
         for (end, arm) in ends(joint).into_iter().zip(arms).filter(|(end, _)| can_move(problem, *end)) {
             let mass = &problem.masses[end as usize];
-            let weight = f64::from(Vec3::from(mass.acceleration).length() / mass.inv_mass);
-            let rest = weight * LAST_BITS * arm;
+            let rest = weight(mass) * LAST_BITS * arm;
             let entry = &mut entries[end as usize];
             entry.lever = arms.into_iter().fold(entry.lever, f64::max);
             (entry.rest, entry.slack) = (entry.rest + rest, entry.slack + rest);
@@ -608,8 +607,8 @@ fn common(body: &Body, i: usize, problem: &StepProblem, lag: f64) -> Common {
 }
 
 /// The size of the weight and forces of a body (N).
-fn weight(world: &World, problem: &StepProblem, body: usize) -> f64 {
-    f64::from(world.bodies[body].mass.mass * Vec3::from(problem.masses[body].acceleration).length())
+fn weight(mass: &MassRow) -> f64 {
+    f64::from(Vec3::from(mass.acceleration).length() / mass.inv_mass)
 }
 
 /// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of them

@@ -63,8 +63,6 @@ struct End {
     against: Vec3,
     /// The velocity of that surface (m/s).
     pace: Vec3,
-    /// A body of the set that joints hold together with this one.
-    island: u32,
 }
 
 /// The path that a body took.
@@ -104,10 +102,12 @@ impl Detector {
         let far = self.far_bodies(world, activity);
         let is_dynamic = |&&i: &&u32| world.bodies[i as usize].kind == BodyKind::Dynamic;
         let ends = far.par_iter().filter(is_dynamic).filter_map(|&i| Some((i, self.end(world, i, dt)?)));
-        let ends = self.hold_joints(world, ends.collect(), dt);
+        let (ends, roots) = self.hold_joints(world, ends.collect(), dt);
+        let is_tied = |i: u32| self.moving[i as usize].tied == 1.0;
+        let root = |i: u32| if is_tied(i) { roots[i as usize] } else { i };
         // Kinetic energy, and energy gained by the stop, of bodies that joints hold together (J).
         let mut energies: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
-        for &(i, End { at: Station { center, rotation }, share, against, pace, island }) in &ends {
+        for &(i, End { at: Station { center, rotation }, share, against, pace }) in &ends {
             let (body, pull) = (&mut world.bodies[i as usize], self.moving[i as usize].pull);
             let undone = (body.mass.mass * pull).dot(body.center_of_mass() - center);
             let before = body.kinetic_energy() - f64::from(undone);
@@ -118,28 +118,29 @@ impl Detector {
             body.position = center - rotation * body.mass.center;
             body.linear_velocity -= (1.0 - share) * dt * pull;
             let after = body.kinetic_energy();
-            let [kinetic, gained] = energies.entry(island).or_default();
+            let [kinetic, gained] = energies.entry(root(i)).or_default();
             (*kinetic, *gained) = (*kinetic + after, *gained + after - before);
         }
-        for (i, End { island, .. }) in &ends {
-            let [kinetic, gained] = energies[island];
+        for &(i, _) in &ends {
+            let [kinetic, gained] = energies[&root(i)];
             if gained > 0.0 {
                 let scale = (1.0 - gained / kinetic).max(0.0).sqrt() as f32;
-                let body = &mut world.bodies[*i as usize];
+                let body = &mut world.bodies[i as usize];
                 body.linear_velocity *= scale;
                 body.angular_velocity *= scale;
             }
         }
-        let tied = ends.iter().map(|(i, _)| *i as usize).filter(|&i| self.moving[i].tied == 1.0);
-        (far, tied.collect())
+        let tied = ends.iter().filter(|(i, _)| is_tied(*i)).map(|(i, _)| *i as usize).collect();
+        (far, tied)
     }
 
     /// Extends stops to jointed bodies. Bodies that joints hold together stay together: each one stops on its path at
-    /// the time when the first of them stops.
-    fn hold_joints(&self, world: &World, mut ends: Vec<(u32, End)>, dt: f32) -> Vec<(u32, End)> {
+    /// the time when the first of them stops. Also returns for each body one that stands for all that joints hold
+    /// together with it; nothing if joints hold no stopped body.
+    fn hold_joints(&self, world: &World, mut ends: Vec<(u32, End)>, dt: f32) -> (Vec<(u32, End)>, Vec<u32>) {
         let is_tied = |i: u32| self.moving[i as usize].tied == 1.0;
         if !ends.iter().any(|&(i, _)| is_tied(i)) {
-            return ends;
+            return (ends, Vec::new());
         }
         let is_dynamic = |i: usize| world.bodies[i].kind == BodyKind::Dynamic;
         let mut islands = Islands::default();
@@ -160,13 +161,11 @@ impl Detector {
         let held = (0..).zip(roots).filter(|&(i, _)| is_tied(i) && is_dynamic(i as usize));
         ends.extend(held.filter_map(|(i, root)| {
             let share = first[*root as usize]?;
-            let at = |share| self.way_of(world, i, dt).at(share);
-            let end = own.get(&i).filter(|end| end.share == share).copied();
-            let end =
-                end.unwrap_or_else(|| End { at: at(share), share, against: Vec3::ZERO, pace: Vec3::ZERO, island: i });
-            Some((i, End { island: *root, ..end }))
+            let end = || End { at: self.way_of(world, i, dt).at(share), share, against: Vec3::ZERO, pace: Vec3::ZERO };
+            Some((i, own.get(&i).filter(|end| end.share == share).copied().unwrap_or_else(end)))
         }));
-        ends
+        let roots = roots.to_vec();
+        (ends, roots)
     }
 
     /// The place where a body stops, or `None` if it does not.
@@ -181,8 +180,7 @@ impl Detector {
             let center = center + (1.0 - time) * other.shift;
             way = BodyPath::between(way.begin, Station { center, rotation }, time * way.turn);
             let against = if is_deep { normal } else { Vec3::ZERO };
-            let at = Station { center, rotation };
-            end = Some(End { at, share: time, against, pace: other.shift / dt, island: i });
+            end = Some(End { at: Station { center, rotation }, share: time, against, pace: other.shift / dt });
         }
         match self.first_on(world, i, &way, dt, false) {
             Some((Impact { time, normal, is_deep }, _)) => Some(End {
@@ -190,7 +188,6 @@ impl Detector {
                 share: end.map_or(time, |end| time * end.share),
                 against: if is_deep { normal } else { Vec3::ZERO },
                 pace: Vec3::ZERO,
-                island: i,
             }),
             None => end,
         }

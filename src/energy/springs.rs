@@ -122,8 +122,8 @@ pub(super) fn add_work_of_drives(
             let axis = Axis::<f64>::load(&problem.axes[k]);
             let motions = [&start, &end].map(|pair| (pair, motion_of(pair, &frames_of(pair, &of_joint), &axis)));
             let speeds = motions.each_ref().map(|(pair, motion)| axis_speed(Rules::default(), pair, motion));
+            let h = substep(body as usize);
             if axis.impulse_scale > 0.0 {
-                let h = substep(body as usize);
                 // Positions at the times of the velocities.
                 let places = [0, 1].map(|i| axis.gap + motions[i].1.moved - 0.5 * h * speeds[i]);
                 let stiffness = f64::from(stiffness(of_world, number, world));
@@ -132,7 +132,7 @@ pub(super) fn add_work_of_drives(
                 (*at_start, *at_end) = (*at_start + before, *at_end + after);
             } else {
                 let impulse = axis_impulse(problem, k, &problem.joint_totals);
-                let most = axis.max_impulse / substep(body as usize) * dt * axis.speed.abs();
+                let most = axis.max_impulse / h * dt * axis.speed.abs();
                 work += speeds.into_iter().map(|speed| impulse * speed).fold(0.0, f64::max).min(most);
             }
         }
