@@ -107,9 +107,8 @@ pub const LAST_BITS: f64 = 4.0 * f32::EPSILON as f64;
 /// Largest number of substeps in a step for which rounding of velocities adds up. Shorter substeps sum changes, which
 /// round less.
 pub const MAX_ROUNDINGS: f64 = 16.0;
-/// Share of its energy by which the rotation of an island that nothing holds can exceed the energy that is left to it,
-/// because its positions are wrong. Above this share its step is refused.
-pub const COARSE: f64 = 0.1;
+/// Share of its energy by which a spring of the caller has to grow between two steps to count as one that jumped.
+pub const MIN_JUMP: f64 = 0.1;
 
 // Sleep and events: src/sleep.rs, src/simulation/events.rs.
 

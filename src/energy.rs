@@ -1,29 +1,31 @@
-//! The law that constraints add no energy: contacts, joints, their springs, limits and preloads only transfer or remove
-//! energy. A step adds to the kinetic energy of an island at most the work of gravity, forces and drives, the energy
-//! that springs of contacts between bodies without joints give back, and energy that the island lost before: 0.1 % of
-//! its motion, and what the springs of its swept joints hold. If an island has more, its velocities are reduced to that
-//! energy. Momentum is conserved unless something outside holds the island.
+//! The laws that constraints change no momentum and add no energy: contacts, joints, their springs, limits and preloads
+//! only transfer energy or remove it. First, an island that nothing outside holds gets the momentum that forces gave it.
+//! Then a step adds to the kinetic energy of an island at most the work of gravity, forces and drives, the energy that
+//! springs of contacts between bodies without joints give back, and energy that the island lost before: 0.1 % of its
+//! motion, and what the springs of its swept joints hold. If an island has more, its velocities are reduced to that
+//! energy.
 //!
 //! A constraint with the impulse J that changes velocities from v to v' adds J·(v + v')/2 to the kinetic energy, so
 //! work counts at mean velocities. If an island gained energy and its bodies moved further than they could, it was torn
-//! apart within the step. That step is refused: the bodies stay, and the next step has shorter substeps. Derivation:
-//! docs/derivation.md, section 11.
+//! apart within the step. That step is refused: the island moves as one rigid body, or stands still if something holds
+//! it, and the next step has shorter substeps. Derivation: docs/derivation.md, section 11.
 
+mod island;
 mod springs;
 
-use glam::{DMat3, DVec3, Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use rayon::prelude::*;
 
 use crate::config::SolverConfig;
-use crate::constants::{COARSE, LAST_BITS, MAX_ROUNDINGS, REGAINED, ROUNDING};
+use crate::constants::{LAST_BITS, MAX_ROUNDINGS, MIN_JUMP, REGAINED, ROUNDING};
 use crate::effort::Effort;
 use crate::error::{Result, ensure};
 use crate::graph::Islands;
 use crate::math::rotation::{product, unit};
-use crate::problem::damping::Decay;
 use crate::problem::{BodyRow, JointImpulseRow, JointRow, MassRow, StepProblem, pose_after};
 use crate::saved::{Archive, Saved};
 use crate::world::{Body, World};
+use island::Island;
 
 /// The energy accounts of all islands.
 #[derive(Debug, Default)]
@@ -78,7 +80,7 @@ impl DriveSprings {
     fn give_back(&mut self, [before, after]: [f64; 2]) -> f64 {
         self.unearned = self.unearned.min(self.energy);
         let jump = before - f64::from(self.energy);
-        if jump > COARSE * before {
+        if jump > MIN_JUMP * before {
             self.unearned += jump as f32;
         }
         let earned = |energy: f64| (energy - f64::from(self.unearned)).max(0.0);
@@ -298,6 +300,8 @@ impl Energy {
     ) -> Taken {
         self.fresh.extend(self.reserves.len()..world.bodies.len());
         self.make_room(world.bodies.len());
+        self.join(world, problem);
+        self.keep_momentum(world, problem, effort, dt.into());
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
         let entry = |(i, body): (usize, &Body)| Entry {
             reserve: self.reserves[i].into(),
@@ -318,7 +322,6 @@ impl Energy {
             all.for_each(|(reserve, entry)| *reserve = entry.kept(0.0) as f32);
             return Taken::default();
         }
-        self.join(world, problem);
         self.add_up(world, problem, effort);
         let mut taken = Taken::default();
         if self.accounts.iter().any(Account::is_over) {
@@ -362,13 +365,13 @@ impl Energy {
         if self.are_known && joints.is_empty() {
             return;
         }
-        let Self { islands, accounts, numbers, entries, .. } = self;
-        islands.reset(entries.len());
+        let Self { islands, accounts, numbers, .. } = self;
+        islands.reset(world.bodies.len());
         // First find out whether a fixed or driven body holds each body.
         const HELD: u32 = 0;
         const FREE: u32 = 1;
         numbers.clear();
-        numbers.resize(entries.len(), UNTOUCHED);
+        numbers.resize(world.bodies.len(), UNTOUCHED);
         let contacts = problem.swept_contacts().map(|c| [c.body_a, c.body_b]);
         for [a, b] in contacts.chain(joints.iter().map(|&j| ends(&problem.joints[j as usize]))) {
             match [can_move(problem, a), can_move(problem, b)] {
@@ -394,10 +397,26 @@ impl Energy {
             } else {
                 numbers[body] = numbers[root as usize];
             }
+            let account = &mut accounts[numbers[body] as usize];
             // A lock of its axes holds a body from outside.
-            accounts[numbers[body] as usize].is_held |= state == HELD || world.bodies[body].has_locked_axis();
+            account.is_held |= state == HELD || world.bodies[body].has_locked_axis();
         }
         self.are_known = joints.is_empty();
+    }
+
+    /// Restores the momentum of the islands that nothing holds, and the parabolas of their centers.
+    fn keep_momentum(&mut self, world: &World, problem: &mut StepProblem, effort: &Effort, dt: f64) {
+        if self.accounts.iter().all(|account| account.is_held) {
+            return;
+        }
+        let is_free = |island: u32| self.accounts.get(island as usize).is_some_and(|account| !account.is_held);
+        list_members(&mut self.members, &self.numbers, is_free);
+        for members in self.members.chunk_by(|a, b| a.0 == b.0) {
+            let mut island = Island { world, problem, members, dt };
+            island.move_with(&island.before());
+            let late = |island: &Island, i: usize| lag(&self.jointed, island.problem, effort, i);
+            island.follow_parabola(late);
+        }
     }
 
     /// Sums the accounts of islands.
@@ -459,26 +478,22 @@ impl Energy {
         dt: f32,
     ) -> Taken {
         let mut taken = Taken::default();
-        self.members.clear();
         let is_over = |island: u32| self.accounts.get(island as usize).is_some_and(Account::is_over);
-        let numbers = self.numbers.iter().copied();
-        self.members.extend(numbers.zip(0..).filter(|(island, _)| is_over(*island)));
-        self.members.sort_unstable();
+        list_members(&mut self.members, &self.numbers, is_over);
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let account = &mut self.accounts[members[0].0 as usize];
             let (over, unpaid, unearned) = (account.made(), account.unpaid(), account.unearned());
             let Account { all, released, overlaps, is_held, is_refused, .. } = account;
-            let members = members.iter().map(|(_, body)| *body as usize);
+            let mut island = Island { world, problem, members, dt: dt.into() };
             // Stabilization lifts bodies at `push_limit` at most, each overlap those that lie on it.
-            let weight: f64 = members.clone().map(|i| weight(&problem.masses[i])).sum();
-            let lift = weight * f64::from(config.push_limit * dt) * f64::from(*overlaps + 1);
+            let lift = island.weight() * f64::from(config.push_limit * dt) * f64::from(*overlaps + 1);
             taken.energy += if over.is_finite() { over } else { all.after };
-            let from_start = (!*is_held).then(|| before(world, problem, dt.into(), members.clone()));
-            let is_whole = over.is_finite()
-                && (unpaid <= lift || all.is_strained)
-                && is_in_reach(world, problem, members.clone(), all.lever, config, dt.into())
-                && brake(world, problem, members.clone(), [over, all.after], from_start.as_ref());
-            for i in members.clone() {
+            let start = (!*is_held).then(|| island.before());
+            *is_refused = !over.is_finite()
+                || (unpaid > lift && !all.is_strained)
+                || !island.is_in_reach(all.lever, config.push_limit.into());
+            let is_whole = !*is_refused && island.brake([over, all.after], start.as_ref());
+            for i in island.members() {
                 let (springs, [at_start, at_end]) = (&mut self.drive_springs[i], self.entries[i].drive_springs);
                 if is_whole {
                     springs.unearned = (f64::from(springs.unearned) + unearned * at_end).min(at_end) as f32;
@@ -486,12 +501,11 @@ impl Energy {
                     springs.energy = at_start as f32;
                 }
             }
+            let is_finer = *is_refused && effort.refine(island.members());
             if !is_whole {
-                taken.refused += 1;
-                *is_refused = true;
-                let is_finer = effort.refine(members.clone());
-                stand_still(world, problem, members, dt.into(), *is_held, is_finer);
+                island.move_rigidly(start.as_ref(), all.before + all.work, is_finer);
             }
+            taken.refused += usize::from(*is_refused);
             // No energy is left over.
             *released = 0.0;
             all.after += all.left();
@@ -519,6 +533,13 @@ impl Energy {
             }
         }
     }
+}
+
+/// Lists the bodies of some islands, sorted by island.
+fn list_members(members: &mut Vec<(u32, u32)>, numbers: &[u32], is_listed: impl Fn(u32) -> bool) {
+    members.clear();
+    members.extend(numbers.iter().copied().zip(0..).filter(|(island, _)| is_listed(*island)));
+    members.sort_unstable();
 }
 
 /// Whether constraints can move a body.
@@ -611,209 +632,7 @@ fn weight(mass: &MassRow) -> f64 {
     f64::from(Vec3::from(mass.acceleration).length() / mass.inv_mass)
 }
 
-/// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of them
-/// could move, the distance by which stabilization moves it, and the longest lever (m) of the joints.
-fn is_in_reach(
-    world: &World,
-    problem: &StepProblem,
-    members: impl Iterator<Item = usize> + Clone,
-    lever: f64,
-    config: &SolverConfig,
-    dt: f64,
-) -> bool {
-    let speed = |i: usize| {
-        let fallen = Vec3::from(problem.masses[i].acceleration).as_dvec3() * dt;
-        world.bodies[i].linear_velocity.as_dvec3().length() + fallen.length()
-    };
-    let fastest = members.clone().map(speed).fold(0.0, f64::max);
-    let reach = (2.0 * fastest + f64::from(config.push_limit)) * dt + lever;
-    members.into_iter().all(|i| Vec3::from(problem.bodies[i].dp).as_dvec3().length() <= reach)
-}
-
 /// Rotation of a body in the step, as its pose will have it.
 fn turn_of(row: &BodyRow) -> Quat {
     unit(Quat::from_array(row.dq))
-}
-
-/// The motion of some bodies as one rigid body.
-#[derive(Clone, Copy, Default)]
-struct RigidMotion {
-    center: DVec3,
-    drift: DVec3,
-    spin: DVec3,
-    /// The energy of the spin (J).
-    turning: f64,
-}
-
-/// The mass of some bodies, their center of mass, momentum, angular momentum about the center, and inertia about it.
-#[derive(Clone, Copy, Default)]
-struct Momenta {
-    mass: f64,
-    center: DVec3,
-    linear: DVec3,
-    angular: DVec3,
-    inertia: DMat3,
-}
-
-impl Momenta {
-    /// Sums over bodies. Each has its center of mass, its velocities, and its rotation in the step.
-    fn of(world: &World, bodies: impl Iterator<Item = (usize, DVec3, [DVec3; 2], Quat)> + Clone) -> Self {
-        let mut all = Self::default();
-        for (i, place, [v, _], _) in bodies.clone() {
-            let m = f64::from(world.bodies[i].mass.mass);
-            all.mass += m;
-            all.center += m * place;
-            all.linear += m * v;
-        }
-        all.center /= all.mass;
-        for (i, place, [v, w], turn) in bodies {
-            let body = &world.bodies[i];
-            let m = f64::from(body.mass.mass);
-            let r = place - all.center;
-            let own = body.mass.world_inertia(product(turn, body.rotation)).as_dmat3();
-            all.angular += m * r.cross(v) + own * w;
-            let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
-            all.inertia += own + (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * m;
-        }
-        all
-    }
-
-    fn rigid(&self) -> RigidMotion {
-        let spin = self.inertia.inverse() * self.angular;
-        let spin = if spin.is_finite() { spin } else { DVec3::ZERO };
-        let drift = self.linear / self.mass;
-        RigidMotion { center: self.center, drift, spin, turning: 0.5 * spin.dot(self.inertia * spin) }
-    }
-}
-
-/// Some bodies after the step.
-fn now(world: &World, problem: &StepProblem, members: impl Iterator<Item = usize> + Clone) -> Momenta {
-    let body = |i: usize| {
-        let row = &problem.bodies[i];
-        let [v, w, way] = [row.v, row.w, row.dp].map(|u| Vec3::from(u).as_dvec3());
-        (i, world.bodies[i].center_of_mass().as_dvec3() + way, [v, w], turn_of(row))
-    };
-    Momenta::of(world, members.map(body))
-}
-
-/// Some bodies before the step, plus the effect of forces and torques since.
-fn before(world: &World, problem: &StepProblem, dt: f64, members: impl Iterator<Item = usize> + Clone) -> Momenta {
-    let body = |i: usize| {
-        let body = &world.bodies[i];
-        let [place, v, w] = [body.center_of_mass(), body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
-        let [of_v, of_w] = [body.linear_damping, body.angular_damping].map(|rate| Decay::of(rate, dt));
-        let gained = Vec3::from(problem.masses[i].acceleration).as_dvec3() * of_v.gain;
-        (i, place, [v * (1.0 - of_v.loss) + gained, w * (1.0 - of_w.loss)], Quat::IDENTITY)
-    };
-    let mut all = Momenta::of(world, members.clone().map(body));
-    let torque = |body: &Body| body.whole_torque().as_dvec3() * Decay::of(body.angular_damping, dt).gain;
-    all.angular += members.map(|i| torque(&world.bodies[i])).sum::<DVec3>();
-    all
-}
-
-/// Removes the energy `over` (J) from the motion of some bodies, which have `kinetic` in total. If nothing holds them,
-/// momentum is conserved: their motion relative to the rigid motion of all slows down, and the rigid motion becomes the
-/// one with the momentum `from_start`. If the rotation with this angular momentum has more energy than is left, because
-/// positions are wrong, the rotation is reduced if the excess is at most the share [`COARSE`]. Otherwise nothing
-/// changes and the result is false. If something holds the bodies, their whole motion slows down.
-fn brake(
-    world: &World,
-    problem: &mut StepProblem,
-    members: impl Iterator<Item = usize> + Clone,
-    [over, kinetic]: [f64; 2],
-    from_start: Option<&Momenta>,
-) -> bool {
-    let now = now(world, problem, members.clone());
-    let [from, mut to] = rigid_motions(&now, from_start);
-    let (inner, left) = (kinetic - from.turning, kinetic - over);
-    if to.turning > left {
-        if to.turning > left + COARSE * kinetic {
-            return false;
-        }
-        let share = (left.max(0.0) / to.turning).sqrt();
-        (to.spin, to.turning) = (to.spin * share, left.max(0.0));
-    }
-    let scale = if inner > 0.0 { ((left - to.turning) / inner).clamp(0.0, 1.0).sqrt() } else { 1.0 };
-    slow_down(world, problem, members, [from, to], scale);
-    true
-}
-
-/// The rigid motion of some bodies now, and the one with the momentum from the start of the step. Both are zero if
-/// something holds the bodies.
-fn rigid_motions(now: &Momenta, from_start: Option<&Momenta>) -> [RigidMotion; 2] {
-    let of_start = |&Momenta { linear, angular, .. }: &Momenta| Momenta { linear, angular, ..*now }.rigid();
-    from_start.map_or([RigidMotion::default(); 2], |start| [now.rigid(), of_start(start)])
-}
-
-/// Scales the motion of some bodies relative to one rigid motion, and replaces that rigid motion by another one.
-fn slow_down(
-    world: &World,
-    problem: &mut StepProblem,
-    members: impl Iterator<Item = usize>,
-    [from, to]: [RigidMotion; 2],
-    scale: f64,
-) {
-    for i in members {
-        let place = world.bodies[i].center_of_mass().as_dvec3() + Vec3::from(problem.bodies[i].dp).as_dvec3();
-        let row = &mut problem.bodies[i];
-        let [v, w] = [row.v, row.w].map(|u| Vec3::from(u).as_dvec3());
-        let at = |motion: &RigidMotion| motion.drift + motion.spin.cross(place - motion.center);
-        row.v = (at(&to) + (v - at(&from)) * scale).as_vec3().to_array();
-        row.w = (to.spin + (w - from.spin) * scale).as_vec3().to_array();
-    }
-}
-
-/// Moves some bodies back to their poses before the step, except for a common fall if nothing holds them. If `is_kept`,
-/// they keep their velocities; otherwise they move as one rigid body.
-fn stand_still(
-    world: &World,
-    problem: &mut StepProblem,
-    members: impl Iterator<Item = usize> + Clone,
-    dt: f64,
-    is_held: bool,
-    is_kept: bool,
-) {
-    let after = before(world, problem, dt, members.clone());
-    let start = before(world, problem, 0.0, members.clone());
-    let gained = (after.linear - start.linear) / start.mass;
-    for i in members.clone() {
-        let (body, row) = (&world.bodies[i], &mut problem.bodies[i]);
-        (row.dp, row.dq) = ([0.0; 3], Quat::IDENTITY.to_array());
-        (row.v, row.w) = (body.linear_velocity.to_array(), body.angular_velocity.to_array());
-        if !is_held {
-            row.v = (Vec3::from(row.v) + gained.as_vec3()).to_array();
-            row.dp = ((start.linear / start.mass + 0.5 * gained) * dt).as_vec3().to_array();
-        }
-    }
-    if !is_kept {
-        let motions = rigid_motions(&now(world, problem, members.clone()), (!is_held).then_some(&after));
-        slow_down(world, problem, members, motions, 0.0);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::world::Shape;
-
-    /// Two balls of 1 kg part at 1 m/s each. A quarter of their energy leaves half of their speeds, relative to the
-    /// motion of both that the momentum of the start has.
-    #[test]
-    fn balls_that_part_keep_a_quarter_of_their_energy_and_the_momentum_of_the_start() {
-        let mut world = World::new();
-        for x in [-1.0, 1.0] {
-            world.insert(Body::dynamic().shape(Shape::ball(0.1)).total_mass(1.0).position(x, 0.0, 0.0));
-        }
-        for drift in [None, Some(3.0_f64)] {
-            let row = |x: f32| BodyRow { v: [x, 0.0, 0.0], ..BodyRow::AT_REST };
-            let mut problem = StepProblem { bodies: vec![row(-1.0), row(1.0)], ..StepProblem::default() };
-            let from_start =
-                drift.map(|drift| Momenta { linear: DVec3::X * 2.0 * drift, ..now(&world, &problem, 0..2) });
-            assert!(brake(&world, &mut problem, 0..2, [0.75, 1.0], from_start.as_ref()));
-            for (row, relative) in problem.bodies.iter().zip([-0.5, 0.5]) {
-                let expected = Vec3::X * (drift.unwrap_or(0.0) as f32 + relative);
-                assert!(Vec3::from(row.v).distance(expected) < 1e-5, "{:?}, not {expected} m/s", row.v);
-            }
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Constraints make no energy (docs/derivation.md, section 11).
 
-use drystone::glam::{Quat, Vec3};
+use drystone::glam::{DVec3, Quat, Vec3};
 use drystone::{Axis, Body, BodyHandle, Cpu, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
 use drystone_scenes::CATALOGUE;
 
@@ -67,6 +67,34 @@ fn what_would_be_torn_apart_keeps_its_momentum() {
         simulation.world.dynamic().map(|b| f64::from(b.mass.mass) * f64::from(b.linear_velocity.length())).sum();
     assert!(most < 1.002, "{most} times the energy of the start");
     assert!((after - before).length() < 1e-4 * size.max(1.0), "momentum {before} became {after}");
+}
+
+/// Substeps alone move the center of a body on joints by g h/2 times the time too far, 5 cm here, and round its velocity in each of
+/// them.
+#[test]
+fn a_chain_that_falls_keeps_to_its_parabola() {
+    let mut world = World::new();
+    let ball = |x: f32| Body::dynamic().shape(Shape::ball(0.2)).total_mass(1.0).position(x, 0.0, 0.0);
+    let bodies = [0.0, 1.0, 2.0, 10.0].map(|x| world.insert(ball(x)));
+    for pair in bodies[..3].windows(2) {
+        world.insert_joint(Joint::new(pair[0], Vec3::new(0.5, 0.0, 0.0), pair[1], Vec3::new(-0.5, 0.0, 0.0)));
+    }
+    world.bodies[bodies[2]].linear_velocity = Vec3::new(0.0, 0.0, 6.0);
+    let g = f64::from(world.gravity.y);
+    let mut simulation = started(world);
+    for _ in 0..300 {
+        simulation.step(DT).expect("a step");
+    }
+    let t = 300.0 * f64::from(DT);
+    let mean = |value: fn(&Body) -> Vec3| {
+        bodies[..3].iter().map(|&body| value(&simulation.world.bodies[body]).as_dvec3()).sum::<DVec3>() / 3.0
+    };
+    let [place, velocity] = [mean(|body| body.position), mean(|body| body.linear_velocity)];
+    let expected = DVec3::new(1.0, 0.5 * g * t * t, 2.0 * t);
+    assert!(place.distance(expected) < 2e-3, "{place} for {expected}");
+    assert!(velocity.distance(DVec3::new(0.0, g * t, 2.0)) < 1e-3, "{velocity}");
+    let free = simulation.world.bodies[bodies[3]].linear_velocity.y;
+    assert!((f64::from(free) - g * t).abs() < 1e-3, "{free} for {} m/s", g * t);
 }
 
 /// A wheel inside of the chassis that carries it by an axle, in free space and at rest. Before, 0.9 MJ within five seconds.
@@ -139,14 +167,14 @@ fn a_slider_that_meets_its_end_makes_no_energy_and_keeps_its_angular_momentum() 
         let ball = Body::dynamic().shape(Shape::ball(0.06)).density(8000.0);
         let [drift, taken, gap] = drift_of_a_pair(ball, slider, spin, 8);
         assert!(
-            drift < 6e-3 && taken < 1e-4 && gap < 2e-4,
+            drift < 1e-5 && taken < 1e-4 && gap < 2e-4,
             "{spin}: angular momentum drifts by {drift:.1e}, the law took {taken:.1e}, it opens by {gap:.1e} m"
         );
     }
 }
 
 /// A spring whose ends are beside the centers of mass. Its stiffness follows the mass of its axis: the law that does not know that takes 2 %
-/// to 6 %. An inertia that does not turn within the step loses 1 % to 4 % of the angular momentum.
+/// to 6 %. If the inertia does not turn within the step, the law takes 0.4 % to 0.8 %.
 #[test]
 fn a_spring_beside_centers_of_mass_keeps_energy_and_angular_momentum() {
     for spin in [Vec3::new(0.3, 4.0, 1.0), Vec3::new(-2.0, 1.0, 3.0), Vec3::new(3.0, 2.0, -2.0)] {
@@ -157,7 +185,7 @@ fn a_spring_beside_centers_of_mass_keeps_energy_and_angular_momentum() {
         };
         let [drift, taken, _] = drift_of_a_pair(light, spring, spin, 32);
         assert!(
-            drift < 4e-3 && taken < 0.01,
+            drift < 1e-5 && taken < 1e-3,
             "{spin}: angular momentum drifts by {drift:.1e}, the law took {taken:.1e}"
         );
     }

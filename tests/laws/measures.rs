@@ -27,6 +27,8 @@ pub struct Mechanics {
     pub momenta: f64,
     /// Likewise of the angular momenta.
     pub spins: f64,
+    /// Sum of mass times distance from the common center times speed (kg m²/s).
+    pub levers: f64,
 }
 
 fn inertia(body: &Body) -> DMat3 {
@@ -70,6 +72,7 @@ impl Mechanics {
             all.spin_about_origin += m * x.cross(v) + own;
             all.momenta += m * beside.length();
             all.spins += m * arm.length() * beside.length() + own.length();
+            all.levers += m * arm.length() * v.length();
         }
         all
     }

@@ -34,6 +34,8 @@ struct Group {
     rate: u32,
     /// Of the worlds of each kind, one in so many runs.
     one_in: usize,
+    /// Only worlds that nothing outside touches run.
+    is_alone: bool,
     backend: fn() -> Box<dyn Backend>,
 }
 
@@ -42,7 +44,16 @@ impl Group {
     fn new(families: &'static [Family], kinds: &'static [Kind]) -> Self {
         let collides = &[false, true];
         let backend = || Box::new(Cpu::new()) as Box<dyn Backend>;
-        Self { families, kinds, collides, config: SolverConfig::default(), rate: 60, one_in: 1, backend }
+        Self {
+            families,
+            kinds,
+            collides,
+            config: SolverConfig::default(),
+            rate: 60,
+            one_in: 1,
+            is_alone: false,
+            backend,
+        }
     }
 
     fn preset(self, preset: Preset) -> Self {
@@ -56,7 +67,10 @@ impl Group {
                 for &collides in self.collides {
                     for seed in (0..worlds()).step_by(self.one_in) {
                         let drawn = Drawn { family, kind, collides, seed };
-                        all.push((drawn, Case::new(drawn.scene(), self.config.clone(), self.rate, SECONDS)));
+                        let case = Case::new(drawn.scene(), self.config.clone(), self.rate, SECONDS);
+                        if !self.is_alone || is_alone(&case.scene.world) {
+                            all.push((drawn, case));
+                        }
                     }
                 }
             }
@@ -164,19 +178,17 @@ fn worlds_beyond_the_precision_of_a_step_gain_nothing() {
     });
 }
 
+/// Joints, contacts, motors, springs and limits change no momentum. Without the law one world of four changed its angular
+/// momentum by more than 1e-4 in 10 s.
 #[test]
-fn joints_without_contacts_keep_the_momentum() {
-    let group = || Group { collides: &[false], ..Group::new(&[Family::Plain], JOINTED) };
-    group().keeps(&["momentum"]);
-    Group { one_in: 3, ..group() }.preset(Preset::Fast).keeps(&["momentum"]);
-    Group { one_in: 3, rate: 30, ..group() }.keeps(&["momentum"]);
-}
-
-/// Before: 6 of 40 worlds of hinges changed it by more than 1e-3.
-#[test]
-fn hinges_sliders_and_welds_keep_the_angular_momentum() {
-    let kinds = &[Kind::Hinge, Kind::Slider, Kind::Fixed];
-    Group { collides: &[false], ..Group::new(&[Family::Plain], kinds) }.keeps(&["spin"]);
+fn what_nothing_touches_keeps_its_momentum() {
+    let group = |families| Group { is_alone: true, one_in: 4, ..Group::new(families, EVERY) };
+    let laws = &["momentum", "spin"];
+    Group { one_in: 2, ..group(&Family::ALL) }.keeps(laws);
+    group(&[Family::Plain]).preset(Preset::Fast).keeps(laws);
+    group(&[Family::Plain]).preset(Preset::Accurate).keeps(laws);
+    Group { rate: 30, ..group(&[Family::Springs]) }.keeps(laws);
+    Group { rate: 240, ..group(&[Family::Levers]) }.keeps(laws);
 }
 
 #[test]
@@ -234,7 +246,4 @@ broken! {
     gaps: "15 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Plain], JOINTED), ["gap"];
     gaps_of_light_and_heavy_bodies: "20 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Ratios], JOINTED), ["gap"];
     gaps_on_long_levers: "18 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Levers], JOINTED), ["gap"];
-    angular_momentum_of_contacts: "2 of 24 worlds change their angular momentum", Group::new(&[Family::Plain], &[Kind::None]), ["spin"];
-    angular_momentum: "96 of 1008 worlds change their angular momentum", Group::new(&Family::ALL, JOINTED), ["spin"];
-    momentum: "1 of 1152 worlds change their momentum", Group::new(&Family::ALL, EVERY), ["momentum"];
 }
