@@ -1,5 +1,5 @@
 //! The laws that constraints change no momentum and add no energy: contacts, joints, their springs, limits and preloads
-//! only transfer energy or remove it. First, an island that nothing outside holds gets the momentum that forces gave it.
+//! only transfer energy or remove it. First, an island on joints that nothing outside holds gets the momentum that forces gave it.
 //! Then a step adds to the kinetic energy of an island at most the work of gravity, forces and drives, the energy that
 //! springs of contacts between bodies without joints give back, and energy that the island lost before: 0.1 % of its
 //! motion, and what the springs of its swept joints hold. If an island has more, its velocities are reduced to that
@@ -190,6 +190,8 @@ struct Account {
     overlaps: u32,
     /// Whether anything outside the island holds it.
     is_held: bool,
+    /// Whether it has joints.
+    is_jointed: bool,
     is_refused: bool,
     /// The share of their largest reserves that its bodies have.
     share: f64,
@@ -300,8 +302,11 @@ impl Energy {
     ) -> Taken {
         self.fresh.extend(self.reserves.len()..world.bodies.len());
         self.make_room(world.bodies.len());
-        self.join(world, problem);
-        self.keep_momentum(world, problem, effort, dt.into());
+        let has_joints = !problem.rows_of(&problem.joint_colors()).is_empty();
+        if has_joints {
+            self.join(world, problem);
+            self.keep_momentum(world, problem, effort, dt.into());
+        }
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
         let entry = |(i, body): (usize, &Body)| Entry {
             reserve: self.reserves[i].into(),
@@ -321,6 +326,9 @@ impl Energy {
             let all = self.reserves.iter_mut().zip(&self.entries);
             all.for_each(|(reserve, entry)| *reserve = entry.kept(0.0) as f32);
             return Taken::default();
+        }
+        if !has_joints {
+            self.join(world, problem);
         }
         self.add_up(world, problem, effort);
         let mut taken = Taken::default();
@@ -365,7 +373,7 @@ impl Energy {
         if self.are_known && joints.is_empty() {
             return;
         }
-        let Self { islands, accounts, numbers, .. } = self;
+        let Self { islands, accounts, numbers, jointed, .. } = self;
         islands.reset(world.bodies.len());
         // First find out whether a fixed or driven body holds each body.
         const HELD: u32 = 0;
@@ -400,16 +408,16 @@ impl Energy {
             let account = &mut accounts[numbers[body] as usize];
             // A lock of its axes holds a body from outside.
             account.is_held |= state == HELD || world.bodies[body].has_locked_axis();
+            account.is_jointed |= jointed[body];
         }
         self.are_known = joints.is_empty();
     }
 
-    /// Restores the momentum of the islands that nothing holds, and the parabolas of their centers.
+    /// Restores the momentum of the islands on joints that nothing holds, and the parabolas of their centers.
     fn keep_momentum(&mut self, world: &World, problem: &mut StepProblem, effort: &Effort, dt: f64) {
-        if self.accounts.iter().all(|account| account.is_held) {
-            return;
-        }
-        let is_free = |island: u32| self.accounts.get(island as usize).is_some_and(|account| !account.is_held);
+        let is_free = |island: u32| {
+            self.accounts.get(island as usize).is_some_and(|account| account.is_jointed && !account.is_held)
+        };
         list_members(&mut self.members, &self.numbers, is_free);
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let mut island = Island { world, problem, members, dt };

@@ -4,6 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
 use super::{turn_of, weight};
 use crate::math::rotation::product;
+use crate::math::{self, exp_rotation};
 use crate::problem::StepProblem;
 use crate::problem::damping::Decay;
 use crate::world::World;
@@ -187,7 +188,7 @@ impl<'a> Island<'a> {
             if !(to.turning > left && whole.length() < to.spin.length() * self.dt) {
                 return;
             }
-            self.turn(&from, DQuat::from_scaled_axis(turn));
+            self.turn(&from, rotation_by(turn));
         }
     }
 
@@ -239,10 +240,10 @@ impl<'a> Island<'a> {
         };
         let [from, to] = self.rigid_motions(Some(start));
         self.slow_down([from, to], share);
-        let half = DMat3::from_quat(DQuat::from_scaled_axis(0.5 * self.dt * to.spin));
+        let half = DMat3::from_quat(rotation_by(0.5 * self.dt * to.spin));
         let inertia = half * self.now().inertia * half.transpose();
         let middle = Momenta { inertia, ..self.now() }.rigid();
-        self.turn(&to, DQuat::from_scaled_axis(self.dt * middle.spin));
+        self.turn(&to, rotation_by(self.dt * middle.spin));
         for i in self.members() {
             let row = &mut self.problem.bodies[i];
             let shift = 0.5 * self.dt * (from.drift + to.drift);
@@ -251,6 +252,12 @@ impl<'a> Island<'a> {
         self.turn_back(start, left);
         self.move_with(start);
     }
+}
+
+/// The rotation by a rotation vector.
+fn rotation_by(turn: DVec3) -> DQuat {
+    let math::Quat { axis, w } = exp_rotation(math::vec3(turn.x, turn.y, turn.z));
+    DQuat::from_xyzw(axis.x, axis.y, axis.z, w).normalize()
 }
 
 #[cfg(test)]

@@ -140,7 +140,6 @@ pub fn follow_parabolas(
         }
         let turn = w - body.allowed_spin(body.angular_velocity);
         row.dp = (Vec3::from_array(row.dp) - half * (v - v_0)).to_array();
-        row.v = free.to_array();
         // A body with unequal moments has turned by the midpoint spin.
         if turn != Vec3::ZERO && !body.mass.is_anisotropic() {
             let back = exp_rotation(math::Vec3::<f32>::load((turn * -half).to_array()));

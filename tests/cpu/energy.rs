@@ -69,14 +69,13 @@ fn what_would_be_torn_apart_keeps_its_momentum() {
     assert!((after - before).length() < 1e-4 * size.max(1.0), "momentum {before} became {after}");
 }
 
-/// Substeps alone move the center of a body on joints by g h/2 times the time too far, 5 cm here, and round its velocity in each of
-/// them.
+/// Substeps alone move the center of a body on joints by g h/2 times the time too far, 5 cm here.
 #[test]
 fn a_chain_that_falls_keeps_to_its_parabola() {
     let mut world = World::new();
     let ball = |x: f32| Body::dynamic().shape(Shape::ball(0.2)).total_mass(1.0).position(x, 0.0, 0.0);
-    let bodies = [0.0, 1.0, 2.0, 10.0].map(|x| world.insert(ball(x)));
-    for pair in bodies[..3].windows(2) {
+    let bodies = [0.0, 1.0, 2.0].map(|x| world.insert(ball(x)));
+    for pair in bodies.windows(2) {
         world.insert_joint(Joint::new(pair[0], Vec3::new(0.5, 0.0, 0.0), pair[1], Vec3::new(-0.5, 0.0, 0.0)));
     }
     world.bodies[bodies[2]].linear_velocity = Vec3::new(0.0, 0.0, 6.0);
@@ -87,14 +86,12 @@ fn a_chain_that_falls_keeps_to_its_parabola() {
     }
     let t = 300.0 * f64::from(DT);
     let mean = |value: fn(&Body) -> Vec3| {
-        bodies[..3].iter().map(|&body| value(&simulation.world.bodies[body]).as_dvec3()).sum::<DVec3>() / 3.0
+        bodies.iter().map(|&body| value(&simulation.world.bodies[body]).as_dvec3()).sum::<DVec3>() / 3.0
     };
     let [place, velocity] = [mean(|body| body.position), mean(|body| body.linear_velocity)];
     let expected = DVec3::new(1.0, 0.5 * g * t * t, 2.0 * t);
     assert!(place.distance(expected) < 2e-3, "{place} for {expected}");
     assert!(velocity.distance(DVec3::new(0.0, g * t, 2.0)) < 1e-3, "{velocity}");
-    let free = simulation.world.bodies[bodies[3]].linear_velocity.y;
-    assert!((f64::from(free) - g * t).abs() < 1e-3, "{free} for {} m/s", g * t);
 }
 
 /// A wheel inside of the chassis that carries it by an axle, in free space and at rest. Before, 0.9 MJ within five seconds.

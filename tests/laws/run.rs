@@ -259,7 +259,7 @@ struct Rounding {
     /// Each substep rounds the place x of a body by up to 2^-24 of it, one this way and one that way: after n of them the body is off by
     /// x 2^-24 times the root of n, with its momentum (kg m²/s).
     places: f64,
-    /// The velocity of each body rounds by up to 2^-24 of itself in each step of a fall, and always the same way while the step changes it by the
+    /// The velocity of each body rounds by up to 2^-24 of itself in each substep of a fall, and always the same way while a substep changes it by the
     /// same number (kg m²/s).
     speeds: f64,
 }
@@ -271,7 +271,7 @@ impl Rounding {
         self.linear += if falls { substeps * UNIT * now.momentum.length() } else { 0.0 };
         let far = world.dynamic().map(|body| f64::from(body.position.length())).fold(0.0, f64::max);
         self.places = self.places.hypot(substeps.sqrt() * UNIT * far * now.momenta);
-        self.speeds += if falls { UNIT * now.levers } else { 0.0 };
+        self.speeds += if falls { substeps * UNIT * now.levers } else { 0.0 };
     }
 }
 
