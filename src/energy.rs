@@ -511,7 +511,7 @@ impl Energy {
             }
             let is_finer = *is_refused && effort.refine(island.members());
             if !is_whole {
-                island.move_rigidly(start.as_ref(), all.before + all.work, is_finer);
+                island.move_rigidly(start.as_ref(), is_finer);
             }
             taken.refused += usize::from(*is_refused);
             // No energy is left over.

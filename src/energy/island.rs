@@ -225,32 +225,51 @@ impl<'a> Island<'a> {
         }
     }
 
-    /// Moves the bodies from their poses before the step as one rigid body, with the momentum of the `start` and at most
-    /// the energy `left` (J) of rotation. They stand still if something holds them. If `is_kept`, they keep their
-    /// velocities relative to each other.
-    pub fn move_rigidly(&mut self, start: Option<&Momenta>, left: f64, is_kept: bool) {
-        for i in self.members() {
-            let (body, row) = (&self.world.bodies[i], &mut self.problem.bodies[i]);
-            (row.dp, row.dq) = ([0.0; 3], Quat::IDENTITY.to_array());
-            (row.v, row.w) = (body.linear_velocity.to_array(), body.angular_velocity.to_array());
-        }
+    /// Moves the bodies from their poses before the step as one rigid body with the momentum of the `start`. They stand
+    /// still if something holds them. If `is_kept`, they keep their velocities relative to each other.
+    pub fn move_rigidly(&mut self, start: Option<&Momenta>, is_kept: bool) {
         let share = if is_kept { 1.0 } else { 0.0 };
-        let Some(start) = start else {
-            return self.slow_down([RigidMotion::default(); 2], share);
-        };
-        let [from, to] = self.rigid_motions(Some(start));
-        self.slow_down([from, to], share);
-        let half = DMat3::from_quat(rotation_by(0.5 * self.dt * to.spin));
-        let inertia = half * self.now().inertia * half.transpose();
-        let middle = Momenta { inertia, ..self.now() }.rigid();
-        self.turn(&to, rotation_by(self.dt * middle.spin));
+        self.go_back(start, DVec3::ZERO, share);
+        let Some(start) = start else { return };
+        let now = self.now();
+        let before = now.with_momentum(start).rigid();
+        let shift = 0.5 * self.dt * (self.drift_at_start() + before.drift);
+        let half = DMat3::from_quat(rotation_by(0.5 * self.dt * before.spin));
+        let middle = Momenta { inertia: half * now.inertia * half.transpose(), ..now.with_momentum(start) }.rigid();
+        self.turn(&before, rotation_by(self.dt * middle.spin));
+        self.turn_back(start, before.turning);
+        if self.now().with_momentum(start).rigid().turning > before.turning * (1.0 + f64::from(f32::EPSILON)) {
+            // The step is too long for the rotation.
+            return self.go_back(Some(start), shift, share);
+        }
         for i in self.members() {
             let row = &mut self.problem.bodies[i];
-            let shift = 0.5 * self.dt * (from.drift + to.drift);
             row.dp = (Vec3::from(row.dp).as_dvec3() + shift).as_vec3().to_array();
         }
-        self.turn_back(start, left);
         self.move_with(start);
+    }
+
+    /// The velocity of the center before the step (m/s).
+    fn drift_at_start(&self) -> DVec3 {
+        let (mut mass, mut linear) = (0.0, DVec3::ZERO);
+        for i in self.members() {
+            let body = &self.world.bodies[i];
+            let m = f64::from(body.mass.mass);
+            (mass, linear) = (mass + m, linear + m * body.linear_velocity.as_dvec3());
+        }
+        linear / mass
+    }
+
+    /// Moves the bodies back to their poses before the step, shifted. They have a share of their velocities before the
+    /// step, relative to a rigid motion with the momentum of the `start`.
+    fn go_back(&mut self, start: Option<&Momenta>, shift: DVec3, share: f64) {
+        for i in self.members() {
+            let (body, row) = (&self.world.bodies[i], &mut self.problem.bodies[i]);
+            (row.dp, row.dq) = (shift.as_vec3().to_array(), Quat::IDENTITY.to_array());
+            (row.v, row.w) = (body.linear_velocity.to_array(), body.angular_velocity.to_array());
+        }
+        let motions = self.rigid_motions(start);
+        self.slow_down(motions, share);
     }
 }
 
@@ -314,13 +333,13 @@ mod tests {
             let mut island =
                 Island { world: &world, problem: &mut problem, members: &[(0, 0), (0, 1), (0, 2)], dt: 1.0 / 60.0 };
             let start = island.before();
-            island.move_rigidly(Some(&start), energy, true);
+            island.move_rigidly(Some(&start), true);
             store(&problem, &[], &mut world);
             swing = swing
                 .max(world.bodies.iter().map(|body| body.angular_velocity.distance(w.as_vec3())).fold(0.0, f32::max));
         }
         let mut island = Island { world: &world, problem: &mut problem, members: &[(0, 0), (0, 1), (0, 2)], dt: 0.0 };
-        island.move_rigidly(None, 0.0, true);
+        island.move_rigidly(None, true);
         let (now, rigid) = (island.now(), island.now().rigid());
         assert!((now.angular - angular).length() < 1e-4 * angular.length(), "{} for {angular}", now.angular);
         assert!((rigid.turning - energy).abs() < 1e-4 * energy, "{} J for {energy} J", rigid.turning);
