@@ -1,9 +1,9 @@
 //! The laws that constraints change no momentum and add no energy: contacts, joints, their springs, limits and preloads
-//! only transfer energy or remove it. First, an island on joints that nothing outside holds gets the momentum that forces gave it.
-//! Then a step adds to the kinetic energy of an island at most the work of gravity, forces and drives, the energy that
-//! springs of contacts between bodies without joints give back, and energy that the island lost before: 0.1 % of its
-//! motion, and what the springs of its swept joints hold. If an island has more, its velocities are reduced to that
-//! energy.
+//! only transfer energy or remove it. First, an island on joints that nothing outside holds gets the momentum that
+//! forces gave it. Then a step adds to the kinetic energy of an island at most the work of gravity, forces and drives,
+//! the energy that springs of contacts between bodies without joints give back, and energy that the island lost before:
+//! 0.1 % of its motion, and what the springs of its swept joints hold. If an island has more, its velocities are reduced
+//! to that energy.
 //!
 //! A constraint with the impulse J that changes velocities from v to v' adds J·(v + v')/2 to the kinetic energy, so
 //! work counts at mean velocities. If an island gained energy and its bodies moved further than they could, it was torn
@@ -422,8 +422,7 @@ impl Energy {
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let mut island = Island { world, problem, members, dt };
             island.move_with(&island.before());
-            let late = |island: &Island, i: usize| lag(&self.jointed, island.problem, effort, i);
-            island.follow_parabola(late);
+            island.follow_parabola(&self.jointed, effort);
         }
     }
 
@@ -496,10 +495,10 @@ impl Energy {
             // Stabilization lifts bodies at `push_limit` at most, each overlap those that lie on it.
             let lift = island.weight() * f64::from(config.push_limit * dt) * f64::from(*overlaps + 1);
             taken.energy += if over.is_finite() { over } else { all.after };
-            let start = (!*is_held).then(|| island.before());
             *is_refused = !over.is_finite()
                 || (unpaid > lift && !all.is_strained)
                 || !island.is_in_reach(all.lever, config.push_limit.into());
+            let start = (!*is_held).then(|| island.before());
             let is_whole = !*is_refused && island.brake([over, all.after], start.as_ref());
             for i in island.members() {
                 let (springs, [at_start, at_end]) = (&mut self.drive_springs[i], self.entries[i].drive_springs);
@@ -511,7 +510,7 @@ impl Energy {
             }
             let is_finer = *is_refused && effort.refine(island.members());
             if !is_whole {
-                island.move_rigidly(start.as_ref(), is_finer);
+                island.move_rigidly(*is_held, is_finer);
             }
             taken.refused += usize::from(*is_refused);
             // No energy is left over.

@@ -54,8 +54,8 @@ pub struct StepStats {
     pub swept_joint_gap: f32,
     /// Energy that the step removed from bodies because constraints had added it (J).
     pub energy_taken: f64,
-    /// Number of islands whose step would have added more energy than they have. Their bodies did not move, and they
-    /// take shorter substeps from the next step on.
+    /// Number of islands whose step would have added more energy than they have. They moved as one rigid body, or stood
+    /// still if something held them, and take shorter substeps from the next step on.
     pub refused: usize,
     /// How often the step was taken again with other substeps, because joints opened beyond the promised gap.
     pub repeats: u32,

@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
-use super::{turn_of, weight};
+use super::{lag, turn_of, weight};
+use crate::effort::Effort;
 use crate::math::rotation::product;
 use crate::math::{self, exp_rotation};
 use crate::problem::StepProblem;
@@ -20,7 +21,7 @@ struct RigidMotion {
 }
 
 /// The mass of some bodies, their center of mass, momentum, angular momentum about the center, and inertia about it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Momenta {
     mass: f64,
     center: DVec3,
@@ -140,19 +141,24 @@ impl<'a> Island<'a> {
         self.slow_down(motions, 1.0);
     }
 
-    /// Moves the bodies as one to the parabola of their center. Without that, the center is ahead of its velocity, by the
-    /// time that `lag` gives for each body (s).
-    pub fn follow_parabola(&mut self, lag: impl Fn(&Self, usize) -> f64) {
+    /// Moves the bodies as one to the parabola of their center. Substeps leave the places of each body ahead of its
+    /// velocity by its [`lag`].
+    pub fn follow_parabola(&mut self, jointed: &[bool], effort: &Effort) {
         let (mut mass, mut ahead) = (0.0, DVec3::ZERO);
         for i in self.members() {
             let body = &self.world.bodies[i];
             let (m, v) = (f64::from(body.mass.mass), Vec3::from(self.problem.bodies[i].v).as_dvec3());
             mass += m;
-            ahead += m * lag(self, i) * (v - body.linear_velocity.as_dvec3());
+            ahead += m * lag(jointed, self.problem, effort, i) * (v - body.linear_velocity.as_dvec3());
         }
+        self.shift(-ahead / mass);
+    }
+
+    /// Shifts all bodies (m).
+    fn shift(&mut self, by: DVec3) {
         for i in self.members() {
             let row = &mut self.problem.bodies[i];
-            row.dp = (Vec3::from(row.dp).as_dvec3() - ahead / mass).as_vec3().to_array();
+            row.dp = (Vec3::from(row.dp).as_dvec3() + by).as_vec3().to_array();
         }
     }
 
@@ -225,51 +231,36 @@ impl<'a> Island<'a> {
         }
     }
 
-    /// Moves the bodies from their poses before the step as one rigid body with the momentum of the `start`. They stand
-    /// still if something holds them. If `is_kept`, they keep their velocities relative to each other.
-    pub fn move_rigidly(&mut self, start: Option<&Momenta>, is_kept: bool) {
+    /// Moves the bodies from their poses before the step as one rigid body, with the momentum that forces give them. If
+    /// something holds them, they stand still. If `is_kept`, they keep their velocities relative to each other.
+    pub fn move_rigidly(&mut self, is_held: bool, is_kept: bool) {
         let share = if is_kept { 1.0 } else { 0.0 };
-        self.go_back(start, DVec3::ZERO, share);
-        let Some(start) = start else { return };
-        let now = self.now();
-        let before = now.with_momentum(start).rigid();
-        let shift = 0.5 * self.dt * (self.drift_at_start() + before.drift);
-        let half = DMat3::from_quat(rotation_by(0.5 * self.dt * before.spin));
-        let middle = Momenta { inertia: half * now.inertia * half.transpose(), ..now.with_momentum(start) }.rigid();
-        self.turn(&before, rotation_by(self.dt * middle.spin));
-        self.turn_back(start, before.turning);
-        if self.now().with_momentum(start).rigid().turning > before.turning * (1.0 + f64::from(f32::EPSILON)) {
+        self.go_back();
+        if is_held {
+            return self.slow_down(self.rigid_motions(None), share);
+        }
+        let start = self.before();
+        let [from, to] = self.rigid_motions(Some(&start));
+        let (now, half) = (self.now(), DMat3::from_quat(rotation_by(0.5 * self.dt * to.spin)));
+        let halfway = Momenta { inertia: half * now.inertia * half.transpose(), ..now.with_momentum(&start) };
+        self.turn(&from, rotation_by(self.dt * halfway.rigid().spin));
+        self.turn_back(&start, to.turning);
+        let [_, turned] = self.rigid_motions(Some(&start));
+        if turned.turning > to.turning * (1.0 + f64::from(f32::EPSILON)) {
             // The step is too long for the rotation.
-            return self.go_back(Some(start), shift, share);
+            self.go_back();
         }
-        for i in self.members() {
-            let row = &mut self.problem.bodies[i];
-            row.dp = (Vec3::from(row.dp).as_dvec3() + shift).as_vec3().to_array();
-        }
-        self.move_with(start);
+        self.slow_down(self.rigid_motions(Some(&start)), share);
+        self.shift(0.5 * self.dt * (from.drift + to.drift));
     }
 
-    /// The velocity of the center before the step (m/s).
-    fn drift_at_start(&self) -> DVec3 {
-        let (mut mass, mut linear) = (0.0, DVec3::ZERO);
-        for i in self.members() {
-            let body = &self.world.bodies[i];
-            let m = f64::from(body.mass.mass);
-            (mass, linear) = (mass + m, linear + m * body.linear_velocity.as_dvec3());
-        }
-        linear / mass
-    }
-
-    /// Moves the bodies back to their poses before the step, shifted. They have a share of their velocities before the
-    /// step, relative to a rigid motion with the momentum of the `start`.
-    fn go_back(&mut self, start: Option<&Momenta>, shift: DVec3, share: f64) {
+    /// Moves the bodies back to their poses and velocities before the step.
+    fn go_back(&mut self) {
         for i in self.members() {
             let (body, row) = (&self.world.bodies[i], &mut self.problem.bodies[i]);
-            (row.dp, row.dq) = (shift.as_vec3().to_array(), Quat::IDENTITY.to_array());
+            (row.dp, row.dq) = ([0.0; 3], Quat::IDENTITY.to_array());
             (row.v, row.w) = (body.linear_velocity.to_array(), body.angular_velocity.to_array());
         }
-        let motions = self.rigid_motions(start);
-        self.slow_down(motions, share);
     }
 }
 
@@ -332,18 +323,35 @@ mod tests {
         for _ in 0..600 {
             let mut island =
                 Island { world: &world, problem: &mut problem, members: &[(0, 0), (0, 1), (0, 2)], dt: 1.0 / 60.0 };
-            let start = island.before();
-            island.move_rigidly(Some(&start), true);
+            island.move_rigidly(false, true);
             store(&problem, &[], &mut world);
             swing = swing
                 .max(world.bodies.iter().map(|body| body.angular_velocity.distance(w.as_vec3())).fold(0.0, f32::max));
         }
         let mut island = Island { world: &world, problem: &mut problem, members: &[(0, 0), (0, 1), (0, 2)], dt: 0.0 };
-        island.move_rigidly(None, true);
+        island.move_rigidly(true, true);
         let (now, rigid) = (island.now(), island.now().rigid());
         assert!((now.angular - angular).length() < 1e-4 * angular.length(), "{} for {angular}", now.angular);
         assert!((rigid.turning - energy).abs() < 1e-4 * energy, "{} J for {energy} J", rigid.turning);
         assert!(now.center.distance(center) < 1e-4, "{}", now.center);
         assert!(swing > 1.0, "the spin changed by {swing} rad/s at most");
+    }
+
+    /// The rows of a step that was torn apart are not numbers.
+    #[test]
+    fn an_island_that_is_torn_apart_keeps_its_momentum() {
+        let mut world = two_balls();
+        for (body, z) in world.bodies.as_mut_slice().iter_mut().zip([-1.0, 1.0]) {
+            body.linear_velocity = Vec3::new(2.0, 0.0, z);
+        }
+        let torn = BodyRow { dp: [f32::NAN; 3], v: [f32::NAN; 3], ..BodyRow::AT_REST };
+        let mut problem =
+            StepProblem { bodies: vec![torn; 2], masses: vec![MassRow::default(); 2], ..StepProblem::default() };
+        let mut island = Island { world: &world, problem: &mut problem, members: &[(0, 0), (0, 1)], dt: 1.0 / 60.0 };
+        island.move_rigidly(false, false);
+        let now = island.now();
+        let [linear, angular] = [DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, -2.0, 0.0)];
+        assert!(now.linear.distance(linear) < 1e-5 && now.angular.distance(angular) < 1e-5, "{now:?}");
+        assert!((now.center.x - 2.0 / 60.0).abs() < 1e-6, "{now:?}");
     }
 }
