@@ -10,9 +10,14 @@ use crate::labyrinth;
 use crate::overlay::ropes;
 use crate::poses::poses;
 use crate::renderer::Shot;
-use drystone::{Result, Simulation, World};
+use drystone::queries::{Filter, Queries};
+use drystone::{Body, BodyKind, Result, Shape, Simulation, World};
 use drystone_maze::Map;
 use drystone_scenes::Scene;
+
+/// A hidden scene is looked at from above in such steps, up to this pitch (rad).
+const STEP_OF_PITCH: f32 = 0.1;
+const MAX_PITCH: f32 = 1.5;
 
 #[derive(Clone, Debug)]
 pub struct Moment {
@@ -81,7 +86,8 @@ impl Film {
         let world = &self.scene.world;
         let bounds = self.bounds();
         let up = -world.gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
-        let camera = Camera::framing(&bounds, up, look.yaw, look.pitch, canvas.aspect());
+        let camera =
+            unhidden(world, |pitch| Camera::framing(&bounds, up, look.yaw, pitch, canvas.aspect()), look.pitch);
         let scale = self
             .frames
             .iter()
@@ -98,6 +104,22 @@ impl Film {
         }
         Ok(())
     }
+}
+
+/// The camera with the least pitch, from `pitch` on, whose view of its target no fixed mesh or height field hides: the
+/// hills of a terrain can be higher than a flat view of a valley.
+fn unhidden(world: &World, camera: impl Fn(f32) -> Camera, pitch: f32) -> Camera {
+    let queries = Queries::of(world);
+    let is_terrain = |_, body: &Body| {
+        let is_surface = |shape: &Shape| !shape.has_volume() && !shape.is_half_space();
+        body.kind == BodyKind::Fixed && body.colliders.iter().any(|collider| is_surface(&collider.shape))
+    };
+    let is_hidden = |camera: &Camera| {
+        let back = camera.eye() - camera.target;
+        queries.ray(camera.target, back, back.length(), &Filter::default().only(&is_terrain)).is_some()
+    };
+    let steeper = (0..).map(|k| pitch + STEP_OF_PITCH * k as f32).take_while(|pitch| *pitch < MAX_PITCH);
+    steeper.map(&camera).find(|camera| !is_hidden(camera)).unwrap_or_else(|| camera(pitch))
 }
 
 /// `count` of the numbers below `all`, evenly spaced, including the last one.
@@ -120,4 +142,26 @@ pub fn draw_game(
         let shot = Shot { poses, colors: &colors, camera: &camera, bounds, container: None, lines: &[] };
         show(&canvas.draw(&shot)?)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flat view into a valley is hidden by hills of triangles, and not by boxes, which are part of the picture.
+    #[test]
+    fn a_camera_looks_over_the_hills_of_a_terrain() {
+        let valley: Vec<Vec<f32>> = (-5..=5).map(|z: i32| vec![(0.4 * z as f32).powi(2); 11]).collect();
+        let hills = Shape::height_field(&valley, Vec3::new(10.0, 1.0, 10.0)).expect("good heights");
+        let wall = Shape::cuboid(5.0, 5.0, 0.1);
+        let bounds = Bounds { low: Vec3::new(-1.0, 0.0, -1.0), high: Vec3::ONE };
+        let pitch_over = |body: Body| {
+            let mut world = World::new();
+            world.insert(body);
+            unhidden(&world, |pitch| Camera::framing(&bounds, Vec3::Y, 0.0, pitch, 1.5), 0.3).pitch
+        };
+        let over_hills = pitch_over(Body::fixed().shape(hills));
+        assert!((0.35..1.2).contains(&over_hills), "{over_hills}");
+        assert_eq!(pitch_over(Body::fixed().shape(wall).position(0.0, 0.0, 3.0)), 0.3);
+    }
 }
