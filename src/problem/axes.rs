@@ -37,9 +37,9 @@ fn axis_of(joint: &Joint, number: usize) -> &Axis {
 }
 
 /// The rows of a joint: the number of an axis, and whether the row is that of its drive. Drives come first, so that
-/// bounds win over them.
+/// bounds win over them. Locked axes have no drives.
 pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
-    let drives = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && axis.bounds != Bounds::Locked);
+    let drives = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && !axis.is_locked());
     let bounds = axes_of(joint).filter(|(_, axis)| axis.bounds != Bounds::Free);
     drives.map(|(i, _)| (i, true)).chain(bounds.map(|(i, _)| (i, false)))
 }
@@ -53,7 +53,8 @@ pub fn drive_count(joint: &Joint) -> usize {
 /// and a spring with the load of its deflection. The torque of a drive counts as a force at the smallest half extent of
 /// body a.
 pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
-    if axes_of(joint).all(|(_, axis)| axis.drive == Drive::None) {
+    let mut driven = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && !axis.is_locked()).peekable();
+    if driven.peek().is_none() {
         return 0.0;
     }
     let a = joint.body_a.index();
@@ -69,19 +70,13 @@ pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
         };
         if i >= 3 { load / world.bodies[a].smallest_half_extent() } else { load }
     };
-    axes_of(joint).map(load).sum()
+    driven.map(load).sum()
 }
 
 /// The rows of the nodes of a joint that is solved directly ([`NodeRow::rows`]). Locks and limits of turns come before
-/// those of shifts, because they give a lever its stiffness. An axis that equal limits lock, and that has a drive, is
-/// swept.
+/// those of shifts, because they give a lever its stiffness.
 pub(super) fn nodes(joint: &Joint) -> impl Iterator<Item = u32> {
-    let is_limit = |axis: &Axis| match axis.bounds {
-        Bounds::Locked => Some(false),
-        Bounds::Between { min, max } if min < max => Some(true),
-        Bounds::Between { .. } => Some(false).filter(|_| axis.drive == Drive::None),
-        Bounds::Free => None,
-    };
+    let is_limit = |axis: &Axis| (axis.bounds != Bounds::Free).then_some(!axis.is_locked());
     let bounds = |are_angles: bool| {
         let rows = (0..).zip(kinds(joint)).filter(move |(_, (i, is_drive))| !is_drive && (*i >= 3) == are_angles);
         let own: Vec<(u32, bool)> =
@@ -143,7 +138,7 @@ pub(super) fn write(
         } else {
             // A soft limit would yield to the load of a drive. A rigid limit takes this load back within the same
             // sweep.
-            let is_pushed = axis.drive != Drive::None && axis.bounds != Bounds::Locked;
+            let is_pushed = axis.drive != Drive::None && !axis.is_locked();
             let row = if is_pushed { AxisRow { rate: limit_rate, mass_scale: 1.0, ..row } } else { row };
             bounded(row, axis.bounds, position)
         });

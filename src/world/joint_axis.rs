@@ -39,8 +39,8 @@ pub enum Bounds {
     Free,
     /// Only zero.
     Locked,
-    /// Any position between two limits, which can be equal. The first angle of a joint counts turns if one of its limits
-    /// is half a turn or more; other angles range from -pi to pi.
+    /// Any position between two limits. Equal limits lock the axis, and its drive then has no effect. The first angle of
+    /// a joint counts turns if one of its limits is half a turn or more; other angles range from -pi to pi.
     Between {
         /// The lower limit (m, rad). A translation, a distance or a first angle can have -infinity for no lower limit.
         min: f32,
@@ -108,6 +108,15 @@ impl Axis {
     /// Free between two limits: see [`Bounds::Between`].
     pub const fn limited(min: f32, max: f32) -> Self {
         Self { bounds: Bounds::Between { min, max }, drive: Drive::None }
+    }
+
+    /// Whether the axis has one position only. A drive cannot move it.
+    pub(crate) fn is_locked(&self) -> bool {
+        match self.bounds {
+            Bounds::Free => false,
+            Bounds::Locked => true,
+            Bounds::Between { min, max } => min == max,
+        }
     }
 
     /// Whether an angle counts turns: one of its limits is half a turn or more.

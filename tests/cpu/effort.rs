@@ -1,12 +1,14 @@
 //! Each island takes the substeps that its loads ask for, and no other island pays.
 
 use crate::common::efforts;
-use crate::common::state::joint_impulses;
+use crate::common::state::{bits, joint_impulses};
 use drystone::config::{JointSolver, Method, Stabilization};
 use drystone::glam::{Quat, Vec3};
 use drystone::metrics::{in_place, rms_speed};
 use drystone::stages::backend::CheckedStep;
-use drystone::{Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{
+    Axis, Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Reference, Shape, Simulation, SolverConfig, World,
+};
 use drystone_conform::compare::compare;
 use drystone_scenes::Scene;
 
@@ -96,6 +98,19 @@ fn a_step_that_opens_a_rod_is_taken_again() {
         })
         .collect();
     assert!(repeats[0] > 0 && repeats[1..].iter().sum::<u32>() <= 2, "{repeats:?}");
+}
+
+/// A drive cannot move an axis that equal limits lock, so the axis holds as firmly as without a drive.
+#[test]
+fn a_drive_along_a_rod_changes_nothing() {
+    let rod = Axis::limited(1.0, 1.0);
+    let [plain, motor, spring] = [rod, rod.motor(2.0, 50.0), rod.spring(2.0, 5.0, 0.1, 50.0)].map(|axis| {
+        let mut simulation = across_a_rod(30.0, |joint| joint.at_distance(axis));
+        run(&mut simulation, 60);
+        bits(&simulation.world, [0, 1])
+    });
+    assert_eq!(motor, plain);
+    assert_eq!(spring, plain);
 }
 
 /// Sweeps promise no gap, so the gaps of the direct solution before them ask for no substeps.

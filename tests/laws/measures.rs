@@ -260,14 +260,16 @@ impl Gap {
     }
 }
 
-/// The longest arm of a joint, or the smallest half extent of its bodies that can move if that is longer (m).
+/// The longest arm of a joint, or the smallest half extent of its bodies that can move if that is longer (m). Where the anchors are apart, as on a
+/// slider, the arm of a body reaches to the further one.
 fn lever(world: &World, joint: &Joint, at: [DVec3; 2]) -> f64 {
-    let of = |(body, at): (Option<&Body>, DVec3)| {
+    let of = |body: Option<&Body>| {
         let Some(body) = body.filter(|body| body.kind == BodyKind::Dynamic) else { return 0.0 };
         let extent = f64::from(body.smallest_half_extent());
-        at.distance(center(body)).max(if extent.is_finite() { extent } else { 0.0 })
+        let arms = at.map(|anchor| anchor.distance(center(body)));
+        arms.into_iter().fold(if extent.is_finite() { extent } else { 0.0 }, f64::max)
     };
-    ends(world, joint).into_iter().zip(at).map(of).fold(1e-9, f64::max)
+    ends(world, joint).into_iter().map(of).fold(1e-9, f64::max)
 }
 
 /// The largest distance of a point of the shapes of a body from its origin, or without shapes the radius of a ball of its inertia (m).

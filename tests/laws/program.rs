@@ -217,9 +217,11 @@ fn answer(options: &Options) -> Result<(), String> {
             write(&case.scene, path)?;
         }
         let verdict = run::run_on(&case, Box::new(Cpu::new()), options.trace);
-        for (step, [motion, weight, springs, work, taken, refused, spin]) in verdict.trace.iter().enumerate() {
+        for (step, [motion, weight, springs, work, taken, refused, spin, gap, substeps]) in
+            verdict.trace.iter().enumerate()
+        {
             println!(
-                "{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e} taken {taken:.3e} refused {refused} spin {spin:.3e}",
+                "{step} motion {motion:.6e} weight {weight:.6e} springs {springs:.6e} work {work:.6e} energy {:.6e} taken {taken:.3e} refused {refused} spin {spin:.3e} gap {gap:.2e} substeps {substeps}",
                 motion + weight + springs - work
             );
         }

@@ -68,13 +68,15 @@ pub struct Verdict {
     pub work: f64,
     pub gap: Gap,
     pub gap_at: u32,
+    /// The steps after which a joint is open by more than [`MAX_GAP`].
+    pub open: u32,
     /// Change of momentum and of angular momentum over what they are made of; none where something outside touches.
     pub drift: Option<[f64; 2]>,
     /// The most substeps of a body.
     pub substeps: u32,
     /// The energy of each step, where asked for: kinetic, potential, of springs, work, taken by the law; then the steps that it refused, and the
     /// change of angular momentum since the start where nothing outside touches (kg m²/s).
-    pub trace: Vec<[f64; 7]>,
+    pub trace: Vec<[f64; 9]>,
 }
 
 impl Verdict {
@@ -194,8 +196,9 @@ fn push(world: &World, limit: f64, overlaps: &Overlaps, depth: f64, open: &BTree
 /// A motor of the speed s pushes by at most its load L towards s. It does work only where the axis moves the way that it pushes, and so only
 /// between rest and s: L |s| at most. A motor at speed 0 does none.
 fn motor_power(world: &World) -> f64 {
-    use drystone::{Axis, Drive, Linear};
+    use drystone::{Axis, Bounds, Drive, Linear};
     let power = |axis: &Axis| match axis.drive {
+        _ if matches!(axis.bounds, Bounds::Between { min, max } if min == max) => 0.0,
         Drive::Motor { speed, max_load } => f64::from(speed.abs()) * f64::from(max_load),
         _ => 0.0,
     };
@@ -422,6 +425,7 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
         if gap.worst() > verdict.gap.worst() {
             (verdict.gap, verdict.gap_at) = (gap, step);
         }
+        verdict.open += u32::from(gap.worst() > MAX_GAP);
         verdict.substeps = verdict.substeps.max(substeps);
         if traces {
             let potential = if alone { 0.0 } else { after.potential };
@@ -433,6 +437,8 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
                 stats.energy_taken,
                 stats.refused as f64,
                 if alone { (after.spin - start.spin).length() } else { 0.0 },
+                gap.worst(),
+                f64::from(substeps),
             ]);
         }
         before = after;

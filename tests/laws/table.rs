@@ -75,14 +75,14 @@ pub fn text(rows: &[Row], worst: usize) -> String {
 /// A line for each world.
 pub fn csv(rows: &[Row]) -> String {
     let mut text = String::from(
-        "world,broken,gain,excess,above_start,scale,push,work,gap_share,gap_angle,drift,spin_drift,substeps,broken_at,seconds,lost\n",
+        "world,broken,gain,excess,above_start,scale,push,work,gap_share,gap_angle,drift,spin_drift,open,gap_at,substeps,broken_at,seconds,lost\n",
     );
     for (drawn, (v, seconds)) in rows {
         let [drift, spin] = v.drift.unwrap_or([f64::NAN; 2]);
         let at = v.broken_at.map_or(String::new(), |step| step.to_string());
         let lost = v.lost.as_deref().unwrap_or_default().replace([',', '\n'], ";");
         text += &format!(
-            "{drawn},{},{:.3e},{:.3e},{:.3e},{:.3e},{:.3e},{:.3e},{:.2e},{:.2e},{drift:.2e},{spin:.2e},{},{at},{seconds:.3},{lost}\n",
+            "{drawn},{},{:.3e},{:.3e},{:.3e},{:.3e},{:.3e},{:.3e},{:.2e},{:.2e},{drift:.2e},{spin:.2e},{},{},{},{at},{seconds:.3},{lost}\n",
             v.broken().join(" "),
             v.gain(),
             v.excess,
@@ -92,6 +92,8 @@ pub fn csv(rows: &[Row]) -> String {
             v.work,
             v.gap.share,
             v.gap.angle,
+            v.open,
+            v.gap_at,
             v.substeps,
         );
     }

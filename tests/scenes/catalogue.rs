@@ -322,9 +322,11 @@ fn all_bodies_ride_round_on_belts_and_none_leaves() {
     }
 }
 
+/// Balls that come alone find the cross in any pose. With 75, 90 or 120 steps between them, one comes under the end of an
+/// arm that closes on the wall at 19 degrees, and jams: friction holds up to 27 degrees at the wall and 6 at the arm.
 #[test]
 fn every_ball_that_passes_a_turnstile_turns_its_cross_by_a_quarter_and_all_pass() {
-    for every in [40, 45, 60, 65, 120] {
+    for every in [40, 45, 60, 65, 110] {
         let (mut quarters, mut passed, mut left) = (0.0, 0, 0);
         flow("turnstile", &[&format!("every={every}")], 1900, |step, simulation, spawners| {
             let world = &simulation.world;
