@@ -24,7 +24,7 @@ fn change_row(first_axis: u32, rows: u32, i: u32, held: bool, change: f32) {
 fn right_of_node(node: u32) -> vec3f {
     let joint = joint_of_node(node);
     let rows = rows_of_node(node);
-    let softness = joint_nodes[node].softness;
+    let softness = joint_nodes[node].softness * YIELDING;
     if rows == ANCHORS { return joint_changes[joint].linear - joint_impulses[joint].linear * softness; }
     // Impulses of axes follow those of joints.
     let first = params.joint_count + joints[joint].first_axis;

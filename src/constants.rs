@@ -67,8 +67,9 @@ pub const STIFFEST: f32 = 0.5;
 /// mass at the end, which go slack and snap, over 50 s. With 3 no chain gains energy and gaps stay below 25 mm. With 2
 /// and less, energy grows by up to 0.1 of the swing, as the added inertia comes and goes. With 4 gaps reach 2.5 m.
 pub const SWING_LIMIT: f64 = 3.0;
-/// Shorter substeps have to reduce the gap of a joint to this fraction. If not, a load that cannot be met holds it open,
-/// and the step is not taken again until the gap has grown by the inverse. Gaps that motion opens fall to a quarter.
+/// Half the substep has to reduce the gap of a joint to this fraction. If the shortest substeps do not, a load that
+/// cannot be met holds it open, and the step is not taken again until the gap has grown by the inverse. Gaps that motion
+/// opens fall to a quarter.
 pub const HELPS: f32 = 0.5;
 /// The largest turn of a body against another in a step for which the angles of their joint keep the directions that
 /// they have when the step begins (rad). The angles are then off by half of its square.
@@ -76,13 +77,14 @@ pub const SLOW_TURN: f32 = 0.02;
 /// Most products of blocks for each node of a system of joints. A chain of balls has 1, a ring 3, and a ladder with two
 /// joints at each seam 6. A sheet of 16 x 16 balls has 100, where more substeps are cheaper.
 pub const MAX_TERMS_A_NODE: usize = 24;
-/// Softness of joints in loops. Loops may be redundant, as in a flat sheet. S is then singular and determines no
-/// impulse. A joint with 2^-14 / 3 yields by 0.04 mm at 1/480 s under 300 times the mass of a ball.
-pub const LOOP_SOFTNESS: f32 = 6.103_515_6e-5 / 3.0;
-/// Softness of joints in trees with locked angles, 2^-19 / 3, above the rounding errors. In single precision the turn
-/// of one link is lost in the turn of a long lever of links: the pivot of the link is a difference of numbers 1e7 times
-/// as large.
-pub const AXIS_SOFTNESS: f32 = 1.907_348_6e-6 / 3.0;
+/// Softness of joints in loops and of joints with locks, 2^-19 / 3, above the rounding errors. Loops may be redundant, as
+/// in a flat sheet: S is then singular and determines no impulse. In single precision the turn of one link is lost in the
+/// turn of a long lever of links: the pivot of the link is a difference of numbers 1e7 times as large.
+pub const JOINT_SOFTNESS: f32 = 1.907_348_6e-6 / 3.0;
+/// The share of its softness by which a joint yields to its whole impulse. It yields to the change of the impulse in a
+/// substep by all of its softness, so the impulses of a lasting load grow within some substeps to what holds the load.
+/// Where loops have no solution, impulses would grow without end with 0.
+pub const YIELDING: f64 = 0.125;
 /// The smallest pivot of a row, relative to the trace of its block in S: 2^-20, above the rounding errors of the
 /// products that are subtracted from a pivot. A smaller pivot is raised to this, so corrections are too small, never
 /// too large.

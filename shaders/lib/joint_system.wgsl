@@ -19,6 +19,9 @@ fn end_term_of_block(block: u32) -> u32 { return joint_systems[joint_systems[3] 
 fn left_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term]; }
 fn right_of_term(term: u32) -> u32 { return joint_systems[joint_systems[4] + 2u * term + 1u]; }
 
+// The share of its softness by which a row yields to its whole impulse.
+const YIELDING: f32 = 0.125;
+
 // Marks, as a softness, a node whose system has not been factored since it began.
 const NOT_FACTORED: f32 = -1.0;
 

@@ -14,7 +14,7 @@ use super::axis::{AxisMotion, Frames, NearerLimit, axis_motion, axis_speed, is_l
 use super::joint::current_anchors;
 use super::pair::relative_velocity;
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
-use crate::constants::MIN_PIVOT;
+use crate::constants::{MIN_PIVOT, YIELDING};
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, select3, turned, vec3};
 use crate::problem::arithmetic::unlocked;
 use crate::problem::{JointSystems, NodeRow};
@@ -639,7 +639,7 @@ fn find_changes<L: Lane>(
         let mut right = [L::default(); 3];
         for (at, right) in right.iter_mut().enumerate() {
             if row.has_row(at) {
-                *right = rows.lacking(i, at) - rows.impulse(i, at) * nodes[i].softness;
+                *right = rows.lacking(i, at) - rows.impulse(i, at) * (nodes[i].softness * L::constant(YIELDING));
             }
         }
         nodes[i].right = vec3(right[0], right[1], right[2]);

@@ -236,7 +236,7 @@ impl JointRows {
     /// class for the step. `gaps_of` gives the gaps of a joint before and after the step.
     ///
     /// Gaps that motion opens fall with the square of the substep. A gap was there before if it does not grow, and a
-    /// load that cannot be met holds it open if shorter substeps leave it. Neither needs shorter substeps.
+    /// load that cannot be met holds it open if the shortest substeps leave it. Neither needs shorter substeps.
     pub fn measure(
         &mut self,
         config: &SolverConfig,
@@ -245,6 +245,7 @@ impl JointRows {
     ) -> bool {
         let Self { openings, before: Before { tried, .. }, shares, systems, .. } = self;
         let is_first = tried.is_empty();
+        let least_share = 1.0 / (1_u32 << Effort::highest(config)) as f32;
         tried.resize(openings.len(), 0.0);
         let mut is_open = false;
         openings.iter_mut().for_each(|opening| (opening.need, opening.next) = (0.0, 0.0));
@@ -257,13 +258,16 @@ impl JointRows {
             let next = if systems[row] == SWEPT { after.max(2.0 * after - before) / DESCENT_SHARE } else { 0.0 };
             opening.next = next / (share * share);
             is_open |= after > 1.0;
+            let did_not_help = !is_first && after > HELPS * was;
+            let has_grown = after > before && HELPS * after > opening.stuck;
             if after <= 1.0 {
-                opening.stuck = 0.0;
-            } else if !is_first && after > HELPS * was {
+                (opening.need, opening.stuck) = (after / (share * share), 0.0);
+            } else if did_not_help && (share <= least_share || !has_grown) {
                 opening.stuck = after;
-            }
-            if after <= 1.0 || after > before && HELPS * after > opening.stuck {
-                opening.need = after / (share * share);
+            } else if has_grown {
+                // After a try that did not help, the next one has a quarter of the substep.
+                let further = if did_not_help { 16.0 } else { 1.0 };
+                opening.need = further * after / (share * share);
             }
         }
         is_open

@@ -248,8 +248,10 @@ fn scenes_that_make_no_energy_lose_none_to_the_law() {
             "joint-grid" => 5e-3,
             // Bodies on joints that land: the springs of their joints and contacts would give energy back.
             "vehicle" | "ragdoll" | "ragdolls" => 1e-2,
-            // Planks settle on their joints by a fraction of a millimeter.
-            "bridge" => 0.2,
+            // Planks swing by millimeters under a load that is large beside this motion. Velocities of joined bodies are
+            // half a substep off their positions, so the energy goes up and down, and the law takes each rise. Over all,
+            // the bridge loses less than with joints that are softer under load.
+            "bridge" => 0.8,
             _ => 1e-3,
         };
         if taken > share * most + rounding || refused > 0 {

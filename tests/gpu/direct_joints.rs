@@ -390,9 +390,10 @@ fn a_sheet_in_a_plane_stays_together_though_its_loops_hold_it_twice() {
     world.bodies[middle] = world.bodies[middle].clone().total_mass(300.0 * world.bodies[0].mass.mass);
     let mut simulation = simulation(world, JointSolver::Direct);
     let gap = largest_gap(&mut simulation, 300);
-    println!("{gap} m");
-    assert!(gap < 1.5e-3, "{gap} m");
-    assert!(simulation.world.bodies[middle].position.y < -0.05, "it did not sag");
+    let sag = -simulation.world.bodies[middle].position.y;
+    println!("gap {gap} m, sag {sag} m");
+    // A taut sheet sags as far as its joints open.
+    assert!(gap < 3e-4 && (0.005..0.04).contains(&sag), "gap {gap} m, sag {sag} m");
 }
 
 /// The ball swings wildly, and rounding decides how far its joint opens: the median of nine starts counts.

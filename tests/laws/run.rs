@@ -18,6 +18,8 @@ pub const SHARE_OF_WEIGHT: f64 = 1e-6;
 pub const MAX_LASTING: f64 = 0.01;
 /// The largest gap of a joint, over its lever, or angle (rad).
 pub const MAX_GAP: f64 = 0.01;
+/// The most steps after which a joint may be open by more than [`MAX_GAP`]: a hit opens joints, and they close again.
+pub const MAX_OPEN: u32 = 30;
 /// The largest change of momentum of what nothing outside touches, over the sum of the sizes of the momenta of the bodies, beyond what the
 /// rounding of places and of a fall explains ([`Rounding`]).
 ///
@@ -75,7 +77,7 @@ pub struct Verdict {
     /// The most substeps of a body.
     pub substeps: u32,
     /// The energy of each step, where asked for: kinetic, potential, of springs, work, taken by the law; then the steps that it refused, and the
-    /// change of angular momentum since the start where nothing outside touches (kg m²/s).
+    /// change of angular momentum since the start where nothing outside touches (kg m²/s), the largest gap, and the most substeps.
     pub trace: Vec<[f64; 9]>,
 }
 
@@ -102,6 +104,7 @@ impl Verdict {
             (self.excess > 0.0, "energy"),
             (self.lasting_gain() > MAX_LASTING, "lasting"),
             (self.gap.worst() > MAX_GAP, "gap"),
+            (self.open > MAX_OPEN, "open"),
             (momentum > MAX_DRIFT, "momentum"),
             (spin > MAX_DRIFT, "spin"),
         ];
