@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::laws::draw::{Drawn, Family, Kind};
 use crate::laws::measures::{Mechanics, Springs, is_alone};
-use crate::laws::run::{Case, MAX_LASTING, Verdict, run_on};
+use crate::laws::run::{Case, MAX_LASTING, MAX_OPEN, Verdict, run_on};
 
 /// Worlds of each group.
 const WORLDS: u64 = 8;
@@ -191,12 +191,24 @@ fn what_nothing_touches_keeps_its_momentum() {
     Group { rate: 240, ..group(&[Family::Levers]) }.keeps(laws);
 }
 
-/// Hits open joints, and loops with a light body hold heavy ones. One world of fifty had a joint that stayed open for a
-/// second or more.
+/// Hits open joints. One world of fifty had a joint that stayed open, as these had for 540 to 600 steps: light links
+/// between heavy bodies yielded for ever, and steps were not tried with substeps short enough.
 #[test]
 fn joints_that_open_close_again() {
     let families = &[Family::Plain, Family::Motors, Family::Springs, Family::Levers];
-    Group::new(families, JOINTED).keeps(&["open"]);
+    Group { one_in: 4, ..Group::new(families, JOINTED) }.keeps(&["open"]);
+    let drawn = [
+        (Family::Plain, Kind::All, true, 7),
+        (Family::Levers, Kind::Fixed, false, 13),
+        (Family::Levers, Kind::Fixed, true, 25),
+        (Family::Levers, Kind::Generic, true, 15),
+        (Family::Springs, Kind::Distance, true, 17),
+    ];
+    drawn.par_iter().for_each(|&(family, kind, collides, seed)| {
+        let drawn = Drawn { family, kind, collides, seed };
+        let verdict = run_on(&Case::new(drawn.scene(), SolverConfig::default(), 60, 10.0), Box::new(Cpu::new()), false);
+        assert!(verdict.open <= MAX_OPEN, "{drawn} is open for {} steps", verdict.open);
+    });
 }
 
 #[test]
