@@ -77,10 +77,13 @@ pub const SLOW_TURN: f32 = 0.02;
 /// Most products of blocks for each node of a system of joints. A chain of balls has 1, a ring 3, and a ladder with two
 /// joints at each seam 6. A sheet of 16 x 16 balls has 100, where more substeps are cheaper.
 pub const MAX_TERMS_A_NODE: usize = 24;
-/// Softness of joints in loops and of joints with locks, 2^-19 / 3, above the rounding errors. Loops may be redundant, as
-/// in a flat sheet: S is then singular and determines no impulse. In single precision the turn of one link is lost in the
-/// turn of a long lever of links: the pivot of the link is a difference of numbers 1e7 times as large.
-pub const JOINT_SOFTNESS: f32 = 1.907_348_6e-6 / 3.0;
+/// Softness of joints in loops. Loops may be redundant, as in a flat sheet: S is then singular and determines no impulse.
+/// 2^-14 / 3 is above the rounding errors of the sums of its products.
+pub const LOOP_SOFTNESS: f32 = 6.103_515_6e-5 / 3.0;
+/// Softness of joints in trees with locked angles, 2^-19 / 3, above the rounding errors. In single precision the turn
+/// of one link is lost in the turn of a long lever of links: the pivot of the link is a difference of numbers 1e7 times
+/// as large.
+pub const AXIS_SOFTNESS: f32 = 1.907_348_6e-6 / 3.0;
 /// The share of its softness by which a joint yields to its whole impulse. It yields to the change of the impulse in a
 /// substep by all of its softness, so the impulses of a lasting load grow within some substeps to what holds the load.
 /// Where loops have no solution, impulses would grow without end with 0.

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::constants::JOINT_SOFTNESS;
+use crate::constants::{AXIS_SOFTNESS, LOOP_SOFTNESS};
 
 /// Connected sets of joints. Each is solved directly by S = L D Lᵀ, in blocks of 3 x 3.
 #[derive(Debug, Default, PartialEq)]
@@ -203,8 +203,11 @@ impl JointSystems {
         self.begins.push(self.nodes.len() as u32);
         let firsts: Vec<_> = (0..nodes.len()).filter(|&i| i == 0 || nodes[i - 1].0 != nodes[i].0).collect();
         let joints: Vec<_> = firsts.into_iter().map(|node| sides(node as u32)).collect();
-        let is_tree_of_balls = nodes.iter().all(|node| node.1 == NodeRow::ANCHORS) && !has_loops(&joints);
-        self.softness.push(if is_tree_of_balls { 0.0 } else { JOINT_SOFTNESS });
+        self.softness.push(match nodes.iter().all(|node| node.1 == NodeRow::ANCHORS) {
+            _ if has_loops(&joints) => LOOP_SOFTNESS,
+            true => 0.0,
+            false => AXIS_SOFTNESS,
+        });
         self.add_terms(base as usize);
         true
     }
