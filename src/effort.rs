@@ -407,7 +407,12 @@ impl Effort {
 
     /// The length of the substeps of a body over that of class 0.
     pub fn share(&self, body: usize) -> f32 {
-        1.0 / (1_u32 << self.class_of(body)) as f32
+        Self::share_of(self.class_of(body))
+    }
+
+    /// The length of the substeps of a class over that of class 0.
+    pub fn share_of(class: u8) -> f32 {
+        1.0 / (1_u32 << class) as f32
     }
 }
 

@@ -636,10 +636,11 @@ fn find_changes<L: Lane>(
     let first_node = own.start;
     for node in own.clone() {
         let (row, i) = (&systems.nodes[node], node - first_node);
+        let yielding = nodes[i].softness * L::constant(YIELDING);
         let mut right = [L::default(); 3];
         for (at, right) in right.iter_mut().enumerate() {
             if row.has_row(at) {
-                *right = rows.lacking(i, at) - rows.impulse(i, at) * (nodes[i].softness * L::constant(YIELDING));
+                *right = rows.lacking(i, at) - rows.impulse(i, at) * yielding;
             }
         }
         nodes[i].right = vec3(right[0], right[1], right[2]);

@@ -39,7 +39,7 @@ fn axis_of(joint: &Joint, number: usize) -> &Axis {
 /// The rows of a joint: the number of an axis, and whether the row is that of its drive. Drives come first, so that
 /// bounds win over them. Locked axes have no drives.
 pub(super) fn kinds(joint: &Joint) -> impl Iterator<Item = (usize, bool)> {
-    let drives = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && !axis.is_locked());
+    let drives = axes_of(joint).filter(|(_, axis)| axis.has_drive());
     let bounds = axes_of(joint).filter(|(_, axis)| axis.bounds != Bounds::Free);
     drives.map(|(i, _)| (i, true)).chain(bounds.map(|(i, _)| (i, false)))
 }
@@ -53,7 +53,7 @@ pub fn drive_count(joint: &Joint) -> usize {
 /// and a spring with the load of its deflection. The torque of a drive counts as a force at the smallest half extent of
 /// body a.
 pub(super) fn driving_force(joint: &Joint, world: &World) -> f32 {
-    let mut driven = axes_of(joint).filter(|(_, axis)| axis.drive != Drive::None && !axis.is_locked()).peekable();
+    let mut driven = axes_of(joint).filter(|(_, axis)| axis.has_drive()).peekable();
     if driven.peek().is_none() {
         return 0.0;
     }
@@ -138,8 +138,7 @@ pub(super) fn write(
         } else {
             // A soft limit would yield to the load of a drive. A rigid limit takes this load back within the same
             // sweep.
-            let is_pushed = axis.drive != Drive::None && !axis.is_locked();
-            let row = if is_pushed { AxisRow { rate: limit_rate, mass_scale: 1.0, ..row } } else { row };
+            let row = if axis.has_drive() { AxisRow { rate: limit_rate, mass_scale: 1.0, ..row } } else { row };
             bounded(row, axis.bounds, position)
         });
     }

@@ -245,7 +245,7 @@ impl JointRows {
     ) -> bool {
         let Self { openings, before: Before { tried, .. }, shares, systems, .. } = self;
         let is_first = tried.is_empty();
-        let least_share = 1.0 / (1_u32 << Effort::highest(config)) as f32;
+        let least_share = Effort::share_of(Effort::highest(config));
         tried.resize(openings.len(), 0.0);
         let mut is_open = false;
         openings.iter_mut().for_each(|opening| (opening.need, opening.next) = (0.0, 0.0));

@@ -110,13 +110,18 @@ impl Axis {
         Self { bounds: Bounds::Between { min, max }, drive: Drive::None }
     }
 
-    /// Whether the axis has one position only. A drive cannot move it.
+    /// Whether the axis has one position only.
     pub(crate) fn is_locked(&self) -> bool {
         match self.bounds {
             Bounds::Free => false,
             Bounds::Locked => true,
             Bounds::Between { min, max } => min == max,
         }
+    }
+
+    /// Whether a motor or spring acts on the axis. None moves a locked one.
+    pub(crate) fn has_drive(&self) -> bool {
+        self.drive != Drive::None && !self.is_locked()
     }
 
     /// Whether an angle counts turns: one of its limits is half a turn or more.

@@ -251,7 +251,7 @@ fn scenes_that_make_no_energy_lose_none_to_the_law() {
             // Planks swing by millimeters under a load that is large beside this motion. Velocities of joined bodies are
             // half a substep off their positions, so the energy goes up and down, and the law takes each rise. Over all,
             // the bridge loses less than with joints that are softer under load.
-            "bridge" => 0.8,
+            "bridge" => 0.7,
             _ => 1e-3,
         };
         if taken > share * most + rounding || refused > 0 {

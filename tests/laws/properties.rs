@@ -78,7 +78,7 @@ impl Group {
         all
     }
 
-    /// Refuses any of the worlds that breaks one of some laws: finite, energy, lasting, gap, momentum, spin.
+    /// Refuses any of the worlds that breaks one of some laws: finite, energy, lasting, gap, open, momentum, spin.
     #[track_caller]
     fn keeps(&self, laws: &[&str]) {
         let cases = self.cases();
@@ -159,6 +159,15 @@ fn springs_give_back_at_most_what_they_took() {
     }
 }
 
+/// Runs some worlds for 10 s by default, and checks the verdict of each.
+fn each_for_ten_seconds(worlds: &[(Family, Kind, bool, u64)], check: impl Fn(Drawn, &Verdict) + Sync) {
+    worlds.par_iter().for_each(|&(family, kind, collides, seed)| {
+        let drawn = Drawn { family, kind, collides, seed };
+        let case = Case::new(drawn.scene(), SolverConfig::default(), 60, 10.0);
+        check(drawn, &run_on(&case, Box::new(Cpu::new()), false));
+    });
+}
+
 /// Of 4,800 worlds without kinematic bodies these gained most, 0.3 to 60 times their energy. f32 cannot resolve, for
 /// example, bodies of 60 g that weld 37 kg on levers of up to 26 m: rounding lifted them.
 #[test]
@@ -170,10 +179,7 @@ fn worlds_beyond_the_precision_of_a_step_gain_nothing() {
         (Family::Motors, Kind::Generic, true, 17),
         (Family::Springs, Kind::All, true, 12),
     ];
-    drawn.par_iter().for_each(|&(family, kind, collides, seed)| {
-        let drawn = Drawn { family, kind, collides, seed };
-        let case = Case::new(drawn.scene(), SolverConfig::default(), 60, 10.0);
-        let verdict = run_on(&case, Box::new(Cpu::new()), false);
+    each_for_ten_seconds(&drawn, |drawn, verdict| {
         assert!(verdict.lasting_gain() < MAX_LASTING, "{drawn} gains {:.1e}", verdict.lasting_gain());
     });
 }
@@ -204,9 +210,7 @@ fn joints_that_open_close_again() {
         (Family::Levers, Kind::Generic, true, 15),
         (Family::Springs, Kind::Distance, true, 17),
     ];
-    drawn.par_iter().for_each(|&(family, kind, collides, seed)| {
-        let drawn = Drawn { family, kind, collides, seed };
-        let verdict = run_on(&Case::new(drawn.scene(), SolverConfig::default(), 60, 10.0), Box::new(Cpu::new()), false);
+    each_for_ten_seconds(&drawn, |drawn, verdict| {
         assert!(verdict.open <= MAX_OPEN, "{drawn} is open for {} steps", verdict.open);
     });
 }
