@@ -234,14 +234,14 @@ impl Pair {
         // Most pairs have one manifold. The default growth of a vector would allocate four, which wastes a kilobyte.
         self.manifolds.reserve_exact(found.len());
         for m in found {
-            candidates.clear();
-            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, sides, prediction)));
-            if candidates.is_empty() {
-                continue;
-            }
             let normal_a = m.subshape_pos1().map_or(m.local_n1, |pose| pose.rotation * m.local_n1);
             // Coincident centers give no direction. Up is finite, and as good as any other.
             let normal = (pose_a.rotation * normal_a).try_normalize().unwrap_or(Vec3::Y);
+            candidates.clear();
+            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, normal, sides, prediction)));
+            if candidates.is_empty() {
+                continue;
+            }
             let mut manifold = Manifold::new(normal, (m.subshape1, m.subshape2), candidates);
             manifold.radius_a = curvature(ca, pose_a.rotation.inverse() * normal);
             manifold.radius_b = curvature(cb, pose_b.rotation.inverse() * normal);
@@ -272,6 +272,7 @@ pub(super) fn pose((c, body): Side) -> Pose {
 fn candidate(
     m: &ParryManifold,
     p: &TrackedContact<()>,
+    normal: Vec3,
     [(ca, a), (cb, b)]: [Side; 2],
     prediction: f32,
 ) -> Option<ManifoldPoint> {
@@ -281,10 +282,11 @@ fn candidate(
     let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);
     let p2 = m.subshape_pos2().map_or(p.local_p2, |pose| pose * p.local_p2);
     let (anchor_a, anchor_b) = (ca.local * p1, cb.local * p2);
-    // Arms to the point midway between the surfaces. Subtract the centers first: the differences are small.
+    // Arms to the point midway between overlapping surfaces. Surfaces apart push each other when they meet, so each arm
+    // leads to its own surface then. Subtract the centers first: the differences are small.
     let on_a = a.rotation * anchor_a - (a.center - a.position);
     let on_b = b.rotation * anchor_b - (b.center - b.position);
-    let half_gap = 0.5 * ((b.center - a.center) + on_b - on_a);
+    let half_gap = 0.5 * ((b.center - a.center) + on_b - on_a - normal * p.dist.max(0.0));
     let usable = p.dist.is_finite() && on_a.is_finite() && on_b.is_finite();
     usable.then(|| ManifoldPoint {
         anchor_a,

@@ -250,7 +250,8 @@ fn assert_apart(what: &str, case: &Case, symmetry: &Symmetry, steps: usize, most
     let apart = apart(case, symmetry, steps);
     let (step, worst) = (1..).zip(&apart).fold((0, 0.0), |worst, (k, &d)| if d > worst.1 { (k, d) } else { worst });
     println!("{what}: {worst:e} of {most:e} m");
-    assert!(worst <= most, "{what}: {worst:e} m apart after step {step}, more than {most:e}");
+    let first = (1..).zip(&apart).find(|(_, d)| **d > most).map_or(0, |(k, _)| k);
+    assert!(worst <= most, "{what}: {worst:e} m apart after step {step}, more than {most:e} from step {first} on");
     assert!(motion(case, steps) > 1e-6, "{what}: nothing moves");
 }
 
@@ -258,7 +259,7 @@ fn assert_apart(what: &str, case: &Case, symmetry: &Symmetry, steps: usize, most
 /// does not. A substep below 1 ms sums velocities from the start of its step (`LONGEST_FROM_START` in src/plan/mod.rs), so all islands take the
 /// same substeps here. Parry stops its search on cones and cylinders by a length, though pairs thinner than 3 cm are magnified for it: `drum`, whose
 /// ends are cylinders, differs by rounding from step 13 on. In step 85 of `ragdoll`, it finds 0.3 mm between a capsule and the edge of a stair, and 1.1 mm
-/// at 16 times the size.
+/// at 16 times the size. In step 83 of `card-house`, it gives two cards normals that differ by 7e-5 at 4 times the size.
 #[test]
 fn a_world_of_another_size_moves_by_the_same_bits() {
     let specs = [
@@ -280,7 +281,11 @@ fn a_world_of_another_size_moves_by_the_same_bits() {
         let mut case = Case::scene(spec);
         case.config.max_substeps = case.config.substeps;
         for size in [4.0, 16.0, 64.0] {
-            let steps = if spec == "ragdoll" { 84 } else { 120 };
+            let steps = match spec {
+                "ragdoll" => 84,
+                "card-house" => 82,
+                _ => 120,
+            };
             assert_apart(&format!("{spec}, {size} times the size"), &case, &scaled(size), steps, 0.0);
         }
     }
@@ -339,9 +344,9 @@ fn worlds_that_are_turned_moved_mirrored_and_reordered_move_accordingly() {
         ("wall:rows=4,columns=4", 300, [3e-5, 2e-5, 2.5e-4, 4e-5, 7e-5]),
         ("mass-ratio", 120, [4e-3, 2e-3, 2e-4, 4e-3, 2e-3]),
         ("chain:links=6", 60, [5e-6, 6e-6, 1.5e-4, 0.0, 0.0]),
-        ("pile:n=27", 10, [2e-6, 2e-6, 2e-5, 4.5e-4, 1e-6]),
+        ("pile:n=27", 10, [2e-6, 2e-6, 2e-5, 1e-5, 1e-6]),
         // At rest: boxes of a meter, some of which fell to another side of a tie.
-        ("pile:n=27", 300, [1.1e-2, 1.6e-2, 5e-3, 0.4, 0.45]),
+        ("pile:n=27", 300, [8e-3, 8e-3, 4e-3, 3e-2, 0.4]),
         ("sphere-plane", 120, [1e-6, 1e-6, 1e-6, 0.0, 0.0]),
     ];
     for (spec, steps, [by_quarter, by_cycle, by_way, in_mirror, by_order]) in cases {
@@ -358,17 +363,17 @@ fn worlds_that_are_turned_moved_mirrored_and_reordered_move_accordingly() {
     // Joints with axes and motors, and five shapes on a plane.
     for (spec, steps, by_cycle, by_way) in [
         ("four-bar", 300, 5e-6, 5e-5),
-        ("drawbridge", 120, 3e-5, 3e-4),
-        ("car", 30, 1e-4, 5e-5),
+        ("drawbridge", 120, 6e-6, 3e-4),
+        ("car", 30, 1e-5, 5e-5),
         // Rounding decides whether a limit is reached in a substep or in the next one.
-        ("ragdoll", 20, 6e-4, 3e-4),
+        ("ragdoll", 20, 3e-5, 3e-4),
     ] {
         assert_apart(&format!("{spec} turned"), &Case::scene(spec), &cycle(), steps, by_cycle);
         assert_apart(&format!("{spec} moved"), &Case::scene(spec), &away(), steps, by_way);
     }
     assert_apart("five shapes turned", &fall(), &cycle(), 30, 1e-5);
     assert_apart("five shapes moved", &fall(), &away(), 30, 3e-4);
-    assert_apart("five shapes in the mirror", &fall(), &mirrored(), 120, 4e-3);
+    assert_apart("five shapes in the mirror", &fall(), &mirrored(), 120, 2e-2);
 }
 
 /// With more sweeps the mirror, the turn and the order matter less, m apart with 1, 4, 16 and 64 sweeps a substep: boxes of a pile that have just met

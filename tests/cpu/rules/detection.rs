@@ -53,18 +53,26 @@ fn bodies_that_part_are_no_pair_any_more() {
     assert_eq!(run(&mut simulation, 60, DT).pairs, 1);
 }
 
+/// Surfaces apart push each other when they meet. Both arms then lead to the same point.
 #[test]
-fn arms_end_midway_between_the_surfaces() {
+fn arms_lead_to_the_own_surface_across_a_gap_and_to_the_middle_of_an_overlap() {
+    for (height, ends) in [(0.51, [0.0, 0.01]), (0.49, [-0.005; 2])] {
+        arms_end_at(height, ends);
+    }
+}
+
+fn arms_end_at(height: f32, ends: [f32; 2]) {
     let mut world = empty();
     world.insert(floor());
-    world.insert(ball().position(0.0, 0.51, 0.0));
+    world.insert(ball().position(0.0, height, 0.0));
+    let before = world.clone();
     let mut simulation = simulation(world, SolverConfig::default().without_sleep());
     run(&mut simulation, 1, DT);
     let manifold = simulation.manifolds().next().expect("near enough");
     let point = manifold.points()[0];
-    let bodies = [manifold.a, manifold.b].map(|side| simulation.world.bodies[side.body].position);
-    for (center, arm) in bodies.into_iter().zip([point.r_a, point.r_b]) {
-        near("height of the contact [m]", (center + arm).y, 0.005, 1e-6);
+    let bodies = [manifold.a, manifold.b].map(|side| before.bodies[side.body.index()].position);
+    for ((center, arm), end) in bodies.into_iter().zip([point.r_a, point.r_b]).zip(ends) {
+        near("height of the end of an arm [m]", (center + arm).y, end, 1e-6);
     }
 }
 
