@@ -1,6 +1,6 @@
 //! The laws that constraints change no momentum and add no energy: contacts, joints, their springs, limits and preloads
-//! only transfer energy or remove it. First, an island on joints that nothing outside holds gets the momentum that
-//! forces gave it. Then a step adds to the kinetic energy of an island at most the work of gravity, forces and drives,
+//! only transfer energy or remove it. First, an island that nothing outside holds gets the momentum that forces gave
+//! it. Then a step adds to the kinetic energy of an island at most the work of gravity, forces and drives,
 //! the energy that springs of contacts between bodies without joints give back, and energy that the island lost before:
 //! 0.1 % of its motion, and what the springs of its swept joints hold. If an island has more, its velocities are reduced
 //! to that energy.
@@ -302,11 +302,8 @@ impl Energy {
     ) -> Taken {
         self.fresh.extend(self.reserves.len()..world.bodies.len());
         self.make_room(world.bodies.len());
-        let has_joints = !problem.rows_of(&problem.joint_colors()).is_empty();
-        if has_joints {
-            self.join(world, problem);
-            self.keep_momentum(world, problem, effort, dt.into());
-        }
+        self.join(world, problem);
+        self.keep_momentum(world, problem, effort, dt.into());
         let substep = |body: usize| f64::from(problem.blocks[effort.block_of(body)].substep.length);
         let entry = |(i, body): (usize, &Body)| Entry {
             reserve: self.reserves[i].into(),
@@ -326,9 +323,6 @@ impl Energy {
             let all = self.reserves.iter_mut().zip(&self.entries);
             all.for_each(|(reserve, entry)| *reserve = entry.kept(0.0) as f32);
             return Taken::default();
-        }
-        if !has_joints {
-            self.join(world, problem);
         }
         self.add_up(world, problem, effort);
         let mut taken = Taken::default();
@@ -413,16 +407,19 @@ impl Energy {
         self.are_known = joints.is_empty();
     }
 
-    /// Restores the momentum of the islands on joints that nothing holds, and the parabolas of their centers.
+    /// Restores the momentum of the islands that nothing holds, and the parabolas of their centers.
     fn keep_momentum(&mut self, world: &World, problem: &mut StepProblem, effort: &Effort, dt: f64) {
-        let is_free = |island: u32| {
-            self.accounts.get(island as usize).is_some_and(|account| account.is_jointed && !account.is_held)
-        };
+        if self.accounts.iter().all(|account| account.is_held) {
+            return;
+        }
+        let is_free = |island: u32| self.accounts.get(island as usize).is_some_and(|account| !account.is_held);
         list_members(&mut self.members, &self.numbers, is_free);
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let mut island = Island { world, problem, members, dt };
-            island.move_with(&island.before());
-            island.follow_parabola(&self.jointed, effort);
+            if self.accounts[members[0].0 as usize].is_jointed || island.is_pushed() {
+                island.move_with(&island.before());
+                island.follow_parabola(&self.jointed, effort);
+            }
         }
     }
 

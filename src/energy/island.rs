@@ -3,6 +3,7 @@
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
 use super::{lag, turn_of, weight};
+use crate::constants::MAX_ROUNDINGS;
 use crate::effort::Effort;
 use crate::math::rotation::product;
 use crate::math::{self, exp_rotation};
@@ -121,6 +122,17 @@ impl<'a> Island<'a> {
             all.angular += torque + mass(i) * (halfway(i) - center).cross(gained(i));
         }
         all
+    }
+
+    /// Whether contacts changed the velocity of any of its bodies.
+    pub fn is_pushed(&self) -> bool {
+        self.members().any(|i| {
+            let (body, v) = (&self.world.bodies[i], Vec3::from(self.problem.bodies[i].v));
+            let decay = Decay::of(body.linear_damping, self.dt);
+            let gained = Vec3::from(self.problem.masses[i].acceleration) * decay.gain as f32;
+            let free = body.linear_velocity * (1.0 - decay.loss) as f32 + gained;
+            v.distance(free) > MAX_ROUNDINGS as f32 * f32::EPSILON * (free.length() + gained.length())
+        })
     }
 
     /// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of
