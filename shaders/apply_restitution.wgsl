@@ -96,7 +96,6 @@ fn restitute_contact(rules: Rules, i: u32) {
         delay = delay + bounce * impact.time;
     }
     if all > 0.0 {
-        keep_locks(&pair);
         delay = delay * reciprocal(all);
         pair.a = delayed(pair.a, before_a, delay);
         pair.b = delayed(pair.b, before_b, delay);

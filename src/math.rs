@@ -8,6 +8,7 @@
 //! caller.
 
 pub mod angles;
+pub mod effective_mass;
 mod movement;
 pub mod rotation;
 

@@ -5,38 +5,57 @@
 
 /// Contacts: tree over boxes, then persistent manifolds.
 pub mod collide {
-    pub use crate::collide::*;
+    pub use crate::collide::Detector;
 }
 
 /// The substeps of each island.
 pub mod effort {
-    pub use crate::effort::*;
+    pub use crate::effort::Effort;
 }
 
 /// Colors: no body occurs twice in one color.
 pub mod graph {
-    pub use crate::graph::*;
+    pub use crate::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
 }
 
 /// A step as a value: plain rows.
 pub mod problem {
-    pub use crate::problem::arithmetic::tangent_mass;
-    pub use crate::problem::*;
+    pub use crate::math::effective_mass::tangent_mass;
+    pub use crate::problem::carry::{Carry, Preload, Written};
+    pub use crate::problem::effective::{EffectiveMass, InverseMass};
+    pub use crate::problem::softness::softness;
+    pub use crate::problem::{
+        AxisRow, BodyRow, ContactRow, ContactRows, ContactSummary, ConvergenceRow, DampingRow, FreeRow, ImpulseRow,
+        InertiaRow, JointImpulseRow, JointRow, JointRows, JointSystems, MassRow, MomentumRow, NO_LIMIT, NodeRow,
+        Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow, begin, lay_out,
+    };
 }
 
 /// The order of work as data: a list of passes.
 pub mod plan {
-    pub use crate::plan::*;
+    pub use crate::plan::{Kernel, Pass};
 }
 
 /// The effect of a pass on its rows. Every function of a shader has a twin of the same name here.
 pub mod kernels {
-    pub use crate::kernels::*;
+    pub use crate::kernels::axis::{Frames, axis_motion};
+    pub use crate::kernels::contact::{
+        current_separation, normal_movement, restitute_contact, solve_contact, warm_start,
+    };
+    pub use crate::kernels::friction::{solve_friction, solve_twist};
+    pub use crate::kernels::joint::joint_column;
+    pub use crate::kernels::momentum::StepLength;
+    pub use crate::kernels::pair::{relative_movement, relative_velocity};
+    pub use crate::kernels::{
+        Axis, Body, Contact, Impulse, Joint, KernelRows, Mass, Momentum, Pair, Point, Rules, SoftnessOf, StepParams,
+        Sym3,
+    };
 }
 
 /// The arithmetic of kernels, for one number or many.
 pub mod math {
-    pub use crate::math::*;
+    pub use crate::math::rotation::{about, arc, product, unit};
+    pub use crate::math::{Lane, Quat, Vec3, vec3};
 }
 
 /// The invariants that backends rely on.

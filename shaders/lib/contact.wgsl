@@ -105,12 +105,13 @@ fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, toget
     let spin_b = spin_of(rules.isotropic, (*pair).mass_b, turn_b);
     let turned = dot3(turn_a, spin_a) + dot3(turn_b, spin_b);
     let all = (*together).all;
-    let moved = (all * all) * ((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turned;
+    let moving = inverse_mass_along(rules.isotropic, pair, contact.normal);
+    let moved = (all * all) * moving + turned;
     let inverse = reciprocal(larger((*together).count, 1.0));
     let about_a = cross3((*together).middle_a * inverse, contact.normal);
     let about_b = cross3((*together).middle_b * inverse, contact.normal);
     let turning = dot3(about_a, spin_of(rules.isotropic, (*pair).mass_a, about_a)) + dot3(about_b, spin_of(rules.isotropic, (*pair).mass_b, about_b));
-    let alike = reciprocal((*together).mass * (((*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass) + turning));
+    let alike = reciprocal((*together).mass * (moving + turning));
     let best = smaller((*together).gain * reciprocal(moved), larger(alike, 1.0));
     let share = select(0.0, best, (*together).count > 1.0 && (*together).gain > 0.0);
     let push = contact.normal * (share * all);
@@ -118,6 +119,7 @@ fn press_as_one(rules: Rules, pair: ptr<function, Pair>, contact: Contact, toget
     (*pair).a.w -= spin_a * share;
     (*pair).b.v += push * (*pair).mass_b.inv_mass;
     (*pair).b.w += spin_b * share;
+    if !rules.isotropic { keep_locks(pair); }
     return share;
 }
 

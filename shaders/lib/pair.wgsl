@@ -14,6 +14,7 @@ fn apply_impulse(isotropic: bool, pair: ptr<function, Pair>, r_a: vec3f, r_b: ve
     (*pair).a.w -= spin_of(isotropic, (*pair).mass_a, cross3(r_a, p));
     (*pair).b.v += p * (*pair).mass_b.inv_mass;
     (*pair).b.w += spin_of(isotropic, (*pair).mass_b, cross3(r_b, p));
+    if !isotropic { keep_locks(pair); }
 }
 
 // Whether a body of the pair has locked axes.
@@ -25,6 +26,12 @@ fn inverse_masses(pair: ptr<function, Pair>) -> vec3f {
     let b = (*pair).mass_b;
     if !has_locks(pair) { return vec3f(a.inv_mass + b.inv_mass); }
     return unlocked(a.locks, vec3f(a.inv_mass)) + unlocked(b.locks, vec3f(b.inv_mass));
+}
+
+// The sum of the inverse masses of the two bodies along a direction of length 1.
+fn inverse_mass_along(isotropic: bool, pair: ptr<function, Pair>, n: vec3f) -> f32 {
+    if isotropic || !has_locks(pair) { return (*pair).mass_a.inv_mass + (*pair).mass_b.inv_mass; }
+    return dot3(n, n * inverse_masses(pair));
 }
 
 // Removes velocities along locked axes, which an impulse gave.

@@ -18,7 +18,7 @@ struct Rules {
     measured: bool,
     // Velocities of bodies are changes since the step began.
     from_start: bool,
-    // Every movable body has the same moment of inertia about all axes.
+    // Every movable body has the same moment of inertia about all axes, and no locked axis.
     isotropic: bool,
     // Points bounce, and friction counts the impulses by which they do.
     bounces: bool,

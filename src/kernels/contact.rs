@@ -6,7 +6,9 @@
 
 use super::Rules;
 use super::friction::{solve_friction, solve_rolling, solve_twist};
-use super::pair::{apply_angular_impulse, apply_impulse, keep_locks, note_correction, relative_velocity, spin_of};
+use super::pair::{
+    apply_angular_impulse, apply_impulse, inverse_mass_along, keep_locks, note_correction, relative_velocity, spin_of,
+};
 use super::rows::{Body, Contact, Free, Impulse, Mass, Pair, Point, SoftnessOf, StepParams};
 use crate::collide::MAX_POINTS;
 use crate::config::FrictionRule;
@@ -191,14 +193,15 @@ fn press_as_one<L: Lane>(
     let (spin_a, spin_b) =
         (spin_of(rules, pair.mass_a.inv_inertia, turn_a), spin_of(rules, pair.mass_b.inv_inertia, turn_b));
     let turned = dot3(turn_a, spin_a) + dot3(turn_b, spin_b);
-    let moved = (all * all) * (pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turned;
+    let moving = inverse_mass_along(rules, pair, contact.normal);
+    let moved = (all * all) * moving + turned;
     // The share is at most that of points that all lack the same velocity. The sweep handles the differences between
     // points.
     let inverse = reciprocal(larger(count, one));
     let (about_a, about_b) = (cross3(middle_a * inverse, contact.normal), cross3(middle_b * inverse, contact.normal));
     let turning = dot3(about_a, spin_of(rules, pair.mass_a.inv_inertia, about_a))
         + dot3(about_b, spin_of(rules, pair.mass_b.inv_inertia, about_b));
-    let alike = reciprocal(mass * ((pair.mass_a.inv_mass + pair.mass_b.inv_mass) + turning));
+    let alike = reciprocal(mass * (moving + turning));
     let best = smaller(gain * reciprocal(moved), larger(alike, one));
     let share = L::select(zero, best, L::and(count.gt(one), gain.gt(zero)));
     let push = contact.normal * (share * all);
@@ -206,6 +209,9 @@ fn press_as_one<L: Lane>(
     pair.a.w -= spin_a * share;
     pair.b.v += push * pair.mass_b.inv_mass;
     pair.b.w += spin_b * share;
+    if !rules.isotropic {
+        keep_locks(pair);
+    }
     share
 }
 
@@ -462,7 +468,6 @@ pub fn restitute_contact<L: Lane>(
         delay = delay + bounce * time;
     }
     if L::any(all.gt(zero)) {
-        keep_locks(pair);
         let bounces = all.gt(zero);
         let delay = L::select(zero, delay * reciprocal(all), bounces);
         for (body, before) in [&mut pair.a, &mut pair.b].into_iter().zip(&before) {

@@ -15,8 +15,8 @@ use super::joint::current_anchors;
 use super::pair::relative_velocity;
 use super::rows::{Axis, Joint, Pair, StepParams, Sym3};
 use crate::constants::{MIN_PIVOT, YIELDING};
+use crate::math::effective_mass::unlocked;
 use crate::math::{Lane, Quat, Scalar, Vec3, cross3, dot3, larger, reciprocal, select3, turned, vec3};
-use crate::problem::arithmetic::unlocked;
 use crate::problem::{JointSystems, NodeRow};
 
 /// A block of a matrix, as three columns. Each column has a fourth number, which nothing reads, so that a column of

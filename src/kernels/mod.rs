@@ -54,7 +54,7 @@ pub struct Rules {
     pub measured: bool,
     /// Whether velocities of bodies are changes since the step began.
     pub from_start: bool,
-    /// Whether every movable body has the same moment of inertia about all axes.
+    /// Whether every movable body has the same moment of inertia about all axes, and no locked axis.
     pub isotropic: bool,
     /// Whether any surface bounces. Points then keep the largest normal impulse of the step.
     pub bounces: bool,

@@ -2,7 +2,7 @@
 
 use super::Rules;
 use super::rows::{Pair, StepParams, Sym3};
-use crate::math::{Lane, Vec3, cross3, larger, turned, vec3};
+use crate::math::{Lane, Vec3, cross3, dot3, larger, turned, vec3};
 
 /// The change of a body's spin by an impulse with the moment u: its inverse inertia times u.
 #[inline(always)]
@@ -17,6 +17,9 @@ pub fn apply_impulse<L: Lane>(rules: Rules, pair: &mut Pair<L>, r_a: Vec3<L>, r_
     pair.a.w -= spin_of(rules, pair.mass_a.inv_inertia, cross3(r_a, p));
     pair.b.v += p * pair.mass_b.inv_mass;
     pair.b.w += spin_of(rules, pair.mass_b.inv_inertia, cross3(r_b, p));
+    if !rules.isotropic {
+        keep_locks(pair);
+    }
 }
 
 /// Which pairs have a body with locked axes.
@@ -34,6 +37,17 @@ pub fn inverse_masses<L: Lane>(pair: &Pair<L>) -> Vec3<L> {
         return all(a + b);
     }
     pair.mass_a.unlocked(all(a)) + pair.mass_b.unlocked(all(b))
+}
+
+/// The sum of the inverse masses of the two bodies along a direction of length 1.
+#[inline(always)]
+pub fn inverse_mass_along<L: Lane>(rules: Rules, pair: &Pair<L>, n: Vec3<L>) -> L {
+    let all = pair.mass_a.inv_mass + pair.mass_b.inv_mass;
+    if rules.isotropic || !L::any(has_locks(pair)) {
+        return all;
+    }
+    let Vec3 { x, y, z } = inverse_masses(pair);
+    L::select(all, dot3(n, vec3(n.x * x, n.y * y, n.z * z)), has_locks(pair))
 }
 
 /// Removes velocities along locked axes, which an impulse gave.

@@ -52,11 +52,11 @@ struct Sweeps<'a> {
 /// The passes of one step.
 ///
 /// ```
-/// use drystone::{Reference, Simulation, SolverConfig, StepPlan};
+/// use drystone::{Simulation, StepPlan};
 /// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &["n=3".into()])?;
-/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(scene.world)?;
 /// let (problem, plan) = simulation.next_problem(scene.dt)?;
 /// assert_eq!(plan, StepPlan::new(simulation.config(), &problem));
 /// assert_eq!(plan.bytes_of_passes(&problem).count(), plan.passes.len());
@@ -75,7 +75,7 @@ crate::saved::cloned!(StepPlan { passes });
 pub(crate) struct PlanKey {
     colors: Vec<u32>,
     blocks: Vec<Block>,
-    /// Whether the bodies of each block have equal moments of inertia. This can change, because joints add
+    /// Whether the bodies of each block move alike along and about all axes. This can change, because joints add
     /// stiffness inertia in each step.
     isotropic: Vec<bool>,
     /// See [`StepProblem::parts`].
@@ -104,9 +104,9 @@ impl PlanKey {
     }
 }
 
-/// Whether the bodies of each block have equal moments of inertia.
+/// Whether the bodies of each block move alike along and about all axes.
 fn isotropic(problem: &StepProblem) -> impl Iterator<Item = bool> {
-    problem.blocks.iter().map(|block| problem.is_isotropic(problem.rows_of(&(block.bodies..block.bodies + 1))))
+    problem.blocks.iter().map(|block| problem.moves_alike(problem.rows_of(&(block.bodies..block.bodies + 1))))
 }
 
 impl StepPlan {

@@ -1,12 +1,12 @@
 //! Effective masses of constraints: entries of S = G M⁻¹ Gᵀ at one contact point, from rows.
-//! `src/problem/arithmetic.rs` has the arithmetic. Derivation: docs/derivation.md.
+//! `src/math/effective_mass.rs` has the arithmetic. Derivation: docs/derivation.md.
 
 use glam::{Mat3, Vec3};
 
-use super::arithmetic::{self, inverse_or_zero, tangent_mass, twist_mass};
-use super::arithmetic::{Mass, Sym3};
 use super::rows::{ContactRow, MassRow};
 use crate::math;
+use crate::math::effective_mass::{self, inverse_or_zero, tangent_mass, twist_mass};
+use crate::math::effective_mass::{Mass, Sym3};
 
 /// Inverse mass (1/kg) and inverse inertia in world axes (1/(kg m²)) of one body.
 #[derive(Clone, Copy, Debug)]
@@ -88,17 +88,17 @@ impl EffectiveMass<'_> {
         tangent_mass(t_1.dot(inertia * t_1), t_2.dot(inertia * t_2), t_1.dot(inertia * t_2))
     }
 
-    /// How strongly friction jams a point: `jamming` in `src/problem/arithmetic.rs`.
+    /// How strongly friction jams a point: `jamming` in `src/math/effective_mass.rs`.
     pub fn jamming(&self, r_a: Vec3, r_b: Vec3) -> f32 {
         let n = Vec3::from_array(self.row.normal);
         let (t_1, t_2) = self.row.tangents();
         let [parted, pressed_1, pressed_2] = [n, t_1, t_2].map(|d| self.entry(r_a, r_b, n, d));
-        arithmetic::jamming(self.row.friction, parted, pressed_1, pressed_2)
+        effective_mass::jamming(self.row.friction, parted, pressed_1, pressed_2)
     }
 
     /// The entry of the directions `d` and `e` at arms `r_a`, `r_b`.
     pub fn entry(&self, r_a: Vec3, r_b: Vec3, d: Vec3, e: Vec3) -> f32 {
         let [r_a, r_b, d, e] = [r_a, r_b, d, e].map(|v| math::Vec3::load(v.to_array()));
-        arithmetic::entry(true, [&self.inverse[0].lane(), &self.inverse[1].lane()], [r_a, r_b], d, e)
+        effective_mass::entry(true, [&self.inverse[0].lane(), &self.inverse[1].lane()], [r_a, r_b], d, e)
     }
 }

@@ -61,7 +61,7 @@ impl BlockKind {
         Self {
             substeps: block.substeps,
             substep: block.substep,
-            isotropic: problem.is_isotropic(bodies),
+            isotropic: problem.moves_alike(bodies),
             has_contacts: !contacts.is_empty(),
             has_joints: !joints.is_empty(),
             has_bodies: !bodies.is_empty(),

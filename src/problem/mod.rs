@@ -1,6 +1,5 @@
 //! One step as plain rows, with the names of the WGSL bindings.
 
-pub(crate) mod arithmetic;
 mod axes;
 mod blocks;
 mod bodies;
@@ -26,7 +25,7 @@ mod summary;
 mod touching;
 mod write;
 
-pub use arithmetic::{Mass, Sym3};
+pub use crate::math::effective_mass::{Mass, Sym3};
 pub(crate) use axes::{drive_count, stiffness};
 pub use blocks::{Block, lay_out};
 pub(crate) use bodies::pose_after;
@@ -53,11 +52,11 @@ use glam::Vec3;
 /// `joint_totals`, `convergence` and `momentum`.
 ///
 /// ```
-/// use drystone::{Reference, Simulation, SolverConfig, StepProblem};
+/// use drystone::{Simulation, StepProblem};
 /// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &["n=3".into()])?;
-/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(scene.world)?;
 /// simulation.step(scene.dt)?;
 /// let problem: StepProblem = simulation.problem().clone();
 /// problem.check()?;
@@ -289,6 +288,12 @@ impl StepProblem {
     /// Number of impulses, including those of patches, joints and axes.
     pub fn impulse_count(&self) -> usize {
         self.impulses.len() + self.joint_impulses.len()
+    }
+
+    /// Whether each of some bodies moves alike along and about all axes: it has no locked axis, and its inertia is
+    /// [isotropic](Self::is_isotropic).
+    pub(crate) fn moves_alike(&self, bodies: &[u32]) -> bool {
+        bodies.iter().all(|&body| self.masses[body as usize].locks == 0.0) && self.is_isotropic(bodies)
     }
 
     /// Whether each of some bodies has the same inverse inertia about all axes. The inverse inertia of a body that

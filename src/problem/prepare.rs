@@ -10,11 +10,11 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::arithmetic::{Frame, Mass, PointKinds, Pose, Sym3, movement_since, point_masses};
 use super::carry::{Preload, preloaded};
 use super::rows::{ContactRow, ImpulseRow, MassRow, PointRow};
 use crate::collide::{MAX_POINTS, Manifold, Placed};
 use crate::lanes::{Lanes, Row8, Shared, WIDTH, Wide, Work};
+use crate::math::effective_mass::{Frame, Mass, PointKinds, Pose, Sym3, movement_since, point_masses};
 use crate::math::{Quat, reciprocal, vec3};
 
 /// Pose of a body, 32 B.

@@ -6,9 +6,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::arithmetic::tangent_of;
 use crate::collide::MAX_POINTS;
 use crate::math;
+use crate::math::effective_mass::tangent_of;
 
 /// State of one body, which a step changes, 64 B.
 #[repr(C)]

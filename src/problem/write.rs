@@ -8,7 +8,6 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::arithmetic::{PointKinds, inverse_or_zero, square_root};
 use super::carry::Carry;
 use super::contacts::Layout;
 use super::effective::{EffectiveMass, InverseMass};
@@ -21,6 +20,7 @@ use crate::collide::{Detector, MAX_POINTS, Manifold, ManifoldPoint, Pair};
 use crate::config::{FrictionRule, SolverConfig};
 use crate::effort::Effort;
 use crate::lanes::{InstructionSet, Shared, WIDTH};
+use crate::math::effective_mass::{PointKinds, inverse_or_zero, square_root};
 use crate::math::{self, dot3, reciprocal};
 use crate::world::{Body, Material, World};
 

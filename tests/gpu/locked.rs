@@ -261,20 +261,30 @@ fn a_body_with_locked_translations_stays_in_its_plane(open: Open) {
     }
 }
 
-/// A locked board of 1 kg stops 20 kg that fall on either end, and bears them.
+/// A locked board of 1 kg stops 20 kg that fall on either end, and carries them. Before: the points of a manifold saw the
+/// velocities that impulses at other points gave the board, and of three crates one flew off again at 0.5 m/s.
 fn contacts_bear_on_a_locked_body_as_on_a_fixed_one(open: Open) {
+    for gap in [0.02, 0.08, 0.1, 0.15] {
+        a_locked_board_carries(gap, open);
+    }
+}
+
+fn a_locked_board_carries(gap: f32, open: Open) {
     let mut world = World::new();
     let board = Body::dynamic().shape(Shape::cuboid(2.0, 0.1, 0.5)).total_mass(1.0).position(0.0, 1.0, 0.0);
     let board = world.insert(board.locked_translations([true; 3]).locked_rotations([true; 3]));
     let crates = [-1.5, 1.5].map(|x| {
-        world.insert(Body::dynamic().shape(Shape::cuboid(0.3, 0.3, 0.3)).total_mass(20.0).position(x, 1.5, 0.0))
+        world.insert(Body::dynamic().shape(Shape::cuboid(0.3, 0.3, 0.3)).total_mass(20.0).position(x, 1.4 + gap, 0.0))
     });
     let mut simulation = simulation(world, 8, open);
-    let mut lowest = f32::INFINITY;
+    let (mut lowest, mut fastest) = (f32::INFINITY, 0.0_f32);
     for _ in 0..120 {
         simulation.step(DT).expect("a step");
-        lowest = crates.iter().fold(lowest, |y, &i| y.min(simulation.world.bodies[i].position.y));
+        let bodies = || crates.iter().map(|&i| &simulation.world.bodies[i]);
+        lowest = bodies().fold(lowest, |y, body| y.min(body.position.y));
+        fastest = bodies().fold(fastest, |v, body| v.max(body.linear_velocity.y));
     }
+    assert!(fastest < 0.02, "{fastest} m/s up after a fall by {gap} m");
     assert!(lowest > 1.4 - 2e-3, "{lowest} m");
     let world = simulation.world;
     assert_eq!(world.bodies[board].position, Vec3::Y);

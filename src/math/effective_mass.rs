@@ -1,8 +1,8 @@
 //! The rows of a contact, from its manifold and from the masses and poses of its bodies. The functions of effective
 //! masses are the twins of `shaders/lib/prepare.wgsl`. Only the processor computes separations.
 
+use super::{Lane, NormalMovement, Quat, Vec3, cross3, dot3, reciprocal, vec3};
 use crate::constants::MIN_JAMMING;
-use crate::math::{Lane, NormalMovement, Quat, Vec3, cross3, dot3, reciprocal, vec3};
 
 /// A symmetric 3x3 matrix: the upper triangle, row by row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
