@@ -3,7 +3,7 @@
 //!     cargo run --release --example build_world
 
 use drystone::glam::{Quat, Vec3};
-use drystone::{Body, Reference, Result, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, Result, Shape, Simulation, World};
 
 fn main() -> Result<()> {
     let mut world = World::new();
@@ -21,7 +21,7 @@ fn main() -> Result<()> {
         .shape_at(Shape::cylinder(0.6, 0.1), Vec3::ZERO, across);
     world.insert(dumbbell.position(0.0, 2.0, 2.0).friction(0.8).named("dumbbell"));
 
-    let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::new(world)?;
     for _ in 0..180 {
         simulation.step(1.0 / 60.0)?;
     }

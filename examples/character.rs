@@ -4,7 +4,7 @@
 //!     cargo run --release --example character
 
 use drystone::glam::Vec3;
-use drystone::{Character, Reference, Result, Simulation, SolverConfig};
+use drystone::{Character, Result, Simulation};
 use drystone_scenes::Scene;
 
 fn main() -> Result<()> {
@@ -13,7 +13,7 @@ fn main() -> Result<()> {
 
 pub fn run(mut print: impl FnMut(String)) -> Result<()> {
     let scene = Scene::find("course", &[])?;
-    let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::new(scene.world)?;
     let capsule = simulation.world.bodies.iter().position(|body| body.name == "character");
     let Some(body) = capsule.and_then(|index| simulation.world.bodies.handle(index)) else { return Ok(()) };
     let mut character = Character::new(body);

@@ -2,13 +2,13 @@
 //!
 //!     cargo run --release --example load_scene -- examples/two_boxes.json
 
-use drystone::{BodyKind, Reference, Result, Simulation, SolverConfig};
+use drystone::{BodyKind, Result, Simulation};
 use drystone_scenes::Scene;
 
 fn main() -> Result<()> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "examples/two_boxes.json".into());
     let scene = Scene::find(&path, &[])?;
-    let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::new(scene.world)?;
     for _ in 0..scene.steps {
         simulation.step(scene.dt)?;
     }

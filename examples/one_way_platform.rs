@@ -3,7 +3,7 @@
 //!     cargo run --release --example one_way_platform
 
 use drystone::glam::Vec3;
-use drystone::{Body, BodyHandle, ColliderOf, ContactHooks, Reference, Result, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, ColliderOf, ContactHooks, Result, Shape, Simulation, World};
 
 /// Height of the upper side of the platform (m).
 const TOP: f32 = 1.1;
@@ -40,7 +40,7 @@ pub fn run(print: &mut dyn FnMut(String)) -> Result<()> {
         ball.velocity(Vec3::Y * speed, Vec3::ZERO)
     };
     let balls: Vec<BodyHandle> = [3.0, 6.0, 9.0].map(|speed| world.insert(throw(speed))).into();
-    let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::new(world)?;
     simulation.set_hooks(Some(Box::new(OneWay { platform })));
     for _ in 0..180 {
         simulation.step(1.0 / 60.0)?;

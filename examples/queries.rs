@@ -4,7 +4,7 @@
 
 use drystone::glam::{Quat, Vec3};
 use drystone::queries::Filter;
-use drystone::{Body, BodyKind, Reference, Result, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyKind, Result, Shape, Simulation, World};
 
 fn main() -> Result<()> {
     run(|line| println!("{line}"))
@@ -18,7 +18,7 @@ pub fn run(mut print: impl FnMut(String)) -> Result<()> {
         world.insert(box_of_wood.position(2.0, y, 0.0));
     }
     world.insert(Body::dynamic().shape(Shape::ball(0.4)).position(-2.0, 0.4, 0.0).named("ball"));
-    let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::new(world)?;
     for _ in 0..60 {
         simulation.step(1.0 / 60.0)?;
     }

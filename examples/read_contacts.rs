@@ -2,12 +2,12 @@
 //!
 //!     cargo run --release --example read_contacts
 
-use drystone::{Reference, Result, Simulation, SolverConfig};
+use drystone::{Result, Simulation};
 use drystone_scenes::Scene;
 
 fn main() -> Result<()> {
     let scene = Scene::find("tower", &["n=3".into()])?;
-    let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    let mut simulation = Simulation::new(scene.world)?;
     for _ in 0..300 {
         simulation.step(scene.dt)?;
     }

@@ -107,15 +107,15 @@ impl Load {
         self.stress / (w * w)
     }
 
-    /// Fewest substeps of a step of `dt` seconds that keep the overlap within `most` (m).
+    /// Fewest substeps of a step of `dt` seconds that keep the overlap within `max_overlap` (m).
     ///
     /// # Errors
     /// The number is larger than the settings accept, or contacts are not soft and their overlap has no known limit.
-    pub fn substeps(&self, most: f64, dt: f32, config: &SolverConfig) -> Result<u32> {
+    pub fn substeps(&self, max_overlap: f64, dt: f32, config: &SolverConfig) -> Result<u32> {
         if config.stabilization != Stabilization::Soft {
             return Err(Error::input("a limit on penetration needs soft contacts: set stabilization=soft"));
         }
-        let substeps = (self.overlap(1, dt, config) / most).sqrt().ceil().max(1.0);
+        let substeps = (self.overlap(1, dt, config) / max_overlap).sqrt().ceil().max(1.0);
         if substeps <= MAX_SUBSTEPS {
             return Ok(substeps as u32);
         }
@@ -123,7 +123,7 @@ impl Load {
         Err(input!(
             "penetration of {:.3e} mm: body {upper} presses on body {lower} with {force:.3e} N, which asks for {substeps} \
              substeps, more than {MAX_SUBSTEPS}; shorten the step",
-            most * 1e3
+            max_overlap * 1e3
         ))
     }
 }

@@ -51,12 +51,12 @@ struct Unfinished {
 /// Steps a world.
 ///
 /// ```
-/// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, Shape, Simulation, World};
 ///
 /// let mut world = World::new();
 /// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
 /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 1.0, 0.0));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// for _ in 0..60 {
 ///     simulation.step(1.0 / 60.0)?;
 /// }
@@ -192,11 +192,11 @@ impl Simulation {
     /// before the first await.
     ///
     /// ```
-    /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// use drystone::{Body, Shape, Simulation, World};
     ///
     /// let mut world = World::new();
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// pollster::block_on(simulation.step_async(0.01))?;
     /// assert!(simulation.world.bodies[ball].linear_velocity.y < -0.09);
     /// # Ok::<(), drystone::Error>(())
@@ -233,14 +233,14 @@ impl Simulation {
     /// state: a fork or a loaded run has none.
     ///
     /// ```
-    /// use drystone::{ContactHooks, Reference, Simulation, SolverConfig, World};
+    /// use drystone::{ContactHooks, Simulation, World};
     ///
     /// /// All pairs touch, and no contact changes.
     /// struct Idle;
     ///
     /// impl ContactHooks for Idle {}
     ///
-    /// let mut simulation = Simulation::with(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(World::new())?;
     /// simulation.set_hooks(Some(Box::new(Idle)));
     /// simulation.step(1.0 / 60.0)?;
     /// simulation.set_hooks(None);
@@ -273,12 +273,12 @@ impl Simulation {
     /// reports that its contacts ended.
     ///
     /// ```
-    /// use drystone::{Body, Event, Listen, Reference, Shape, Simulation, SolverConfig, World};
+    /// use drystone::{Body, Event, Listen, Shape, Simulation, World};
     ///
     /// let mut world = World::new();
     /// let floor = world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 1.0, 0.0));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// simulation.listen(Listen { contacts: true, hits_above: Some(1.0), ..Listen::default() })?;
     /// let mut told = Vec::new();
     /// for _ in 0..60 {
@@ -479,7 +479,7 @@ impl Simulation {
     /// let mut world = World::new();
     /// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// simulation.step(1.0 / 60.0)?;
     /// let hit = simulation.queries().ray(Vec3::new(-5.0, 0.5, 0.0), Vec3::X, 10.0, &Filter::default()).expect("the ball");
     /// assert_eq!(hit.body, ball);
@@ -549,12 +549,12 @@ impl Simulation {
     /// contacts of the body, else at all contacts.
     ///
     /// ```
-    /// use drystone::{Body, Listen, Reference, Shape, Simulation, SolverConfig, World};
+    /// use drystone::{Body, Listen, Shape, Simulation, World};
     ///
     /// let mut world = World::new();
     /// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
     /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
     /// for _ in 0..20 {
     ///     simulation.step(1.0 / 60.0)?;
@@ -593,7 +593,7 @@ impl Simulation {
     /// let beam = Body::dynamic().shape(Shape::cuboid(0.5, 0.05, 0.05)).total_mass(2.0);
     /// let beam = world.insert(beam.position(0.5, 0.0, 0.0));
     /// let weld = world.insert_joint(Joint::new(wall, Vec3::ZERO, beam, Vec3::X * -0.5).fixed());
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// assert_eq!(simulation.joint_force(weld), None);
     /// (0..120).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
     /// // The wall bears the weight of 2 kg at 0.5 m.

@@ -11,11 +11,11 @@ use crate::world::BodyHandle;
 /// Times and counts of one step.
 ///
 /// ```
-/// use drystone::{Reference, Simulation, SolverConfig, StepStats};
+/// use drystone::{Simulation, StepStats};
 /// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &[])?;
-/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(scene.world)?;
 /// let stats: StepStats = simulation.step(scene.dt)?;
 /// assert_eq!((stats.manifolds, stats.points, stats.asleep, stats.first_non_finite), (10, 40, 0, None));
 /// assert!(stats.colors >= 2 && stats.overflow == 0);
@@ -84,10 +84,10 @@ pub const EFFORT_CLASSES: usize = 13;
 /// The contact that needs the most substeps.
 ///
 /// ```
-/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone::Simulation;
 /// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(scene.world)?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
@@ -118,10 +118,10 @@ fn as_indices<S: serde::Serializer>(bodies: &[Option<BodyHandle>; 2], serializer
 /// Time of a device at one kernel in one step.
 ///
 /// ```
-/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone::Simulation;
 /// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(scene.world)?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
@@ -145,10 +145,10 @@ pub struct KernelTime {
 /// The bytes and dispatches of a step between the processor and a device.
 ///
 /// ```
-/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone::Simulation;
 /// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(scene.world)?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;
@@ -175,10 +175,10 @@ pub struct Traffic {
 /// Wall time of each stage of a step. It is zero in a browser, because WebAssembly has no clock.
 ///
 /// ```
-/// # use drystone::{Reference, Simulation, SolverConfig};
+/// # use drystone::Simulation;
 /// # use drystone_scenes::Scene;
 /// # let scene = Scene::find("tower", &["top_ratio=1000".into()])?;
-/// # let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(scene.world)?;
 /// # let mut stats = simulation.step(scene.dt)?;
 /// # for _ in 0..10 {
 /// #     stats = simulation.step(scene.dt)?;

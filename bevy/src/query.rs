@@ -124,18 +124,18 @@ pub struct SpatialView<'a> {
 }
 
 impl SpatialView<'_> {
-    /// The first body that a ray meets within the distance `most` (m).
-    pub fn ray(&self, origin: Vec3, direction: Vec3, most: f32, filter: &SpatialFilter) -> Option<SpatialHit> {
-        self.filtered(filter, |filter| self.hit(self.queries.ray(origin, direction, most, filter)?))
+    /// The first body that a ray meets within `max_distance` (m).
+    pub fn ray(&self, origin: Vec3, direction: Vec3, max_distance: f32, filter: &SpatialFilter) -> Option<SpatialHit> {
+        self.filtered(filter, |filter| self.hit(self.queries.ray(origin, direction, max_distance, filter)?))
     }
 
-    /// All bodies that a ray meets within the distance `most` (m), nearest first.
-    pub fn ray_all(&self, origin: Vec3, direction: Vec3, most: f32, filter: &SpatialFilter) -> Vec<SpatialHit> {
-        let hits = self.filtered(filter, |filter| self.queries.ray_all(origin, direction, most, filter));
+    /// All bodies that a ray meets within `max_distance` (m), nearest first.
+    pub fn ray_all(&self, origin: Vec3, direction: Vec3, max_distance: f32, filter: &SpatialFilter) -> Vec<SpatialHit> {
+        let hits = self.filtered(filter, |filter| self.queries.ray_all(origin, direction, max_distance, filter));
         hits.into_iter().filter_map(|hit| self.hit(hit)).collect()
     }
 
-    /// The first body that a shape meets on its way from a pose along a direction, within the distance `most` (m). The
+    /// The first body that a shape meets on its way from a pose along a direction, within `max_distance` (m). The
     /// shape does not rotate.
     pub fn cast(
         &self,
@@ -143,15 +143,17 @@ impl SpatialView<'_> {
         position: Vec3,
         rotation: Quat,
         direction: Vec3,
-        most: f32,
+        max_distance: f32,
         filter: &SpatialFilter,
     ) -> Option<SpatialHit> {
-        self.filtered(filter, |filter| self.hit(self.queries.cast(shape, position, rotation, direction, most, filter)?))
+        self.filtered(filter, |filter| {
+            self.hit(self.queries.cast(shape, position, rotation, direction, max_distance, filter)?)
+        })
     }
 
-    /// The body whose surface is nearest to a point, up to the distance `most` (m); negative inside.
-    pub fn closest(&self, point: Vec3, most: f32, filter: &SpatialFilter) -> Option<SpatialHit> {
-        self.filtered(filter, |filter| self.hit(self.queries.closest(point, most, filter)?))
+    /// The body whose surface is nearest to a point, up to `max_distance` (m); negative inside.
+    pub fn closest(&self, point: Vec3, max_distance: f32, filter: &SpatialFilter) -> Option<SpatialHit> {
+        self.filtered(filter, |filter| self.hit(self.queries.closest(point, max_distance, filter)?))
     }
 
     /// The bodies that contain a point (m), and the index of the shape.

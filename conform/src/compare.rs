@@ -30,7 +30,7 @@
 
 use drystone::stages::plan::Pass;
 use drystone::stages::problem::JointSystems;
-use drystone::{Backend, Body, Error, Result, Simulation, SolverConfig, StepPlan, StepProblem, World};
+use drystone::{Backend, Body, BodyHandle, Error, Result, Simulation, SolverConfig, StepPlan, StepProblem, World};
 use drystone_scenes::{Scene, Spawners};
 
 /// The difference between two worlds.
@@ -107,8 +107,9 @@ const QUANTITIES: [&str; 13] = [
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct BodyDifference {
-    /// Index of the body.
-    pub body: usize,
+    /// The body in each world. Written as their indices.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "as_indices"))]
+    pub bodies: [Option<BodyHandle>; 2],
     /// The name of the number, for example `position.x`. It is `presence` if the body is in only one world, or if
     /// another body has its index.
     pub quantity: &'static str,
@@ -116,19 +117,27 @@ pub struct BodyDifference {
     pub values: [f32; 2],
 }
 
+#[cfg(feature = "serde")]
+fn as_indices<S: serde::Serializer>(
+    bodies: &[Option<BodyHandle>; 2],
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    serde::Serialize::serialize(&bodies.map(|body| body.map(BodyHandle::index)), serializer)
+}
+
 impl BodyDifference {
     /// The first number of the first body that differs in any bit.
     pub fn first(a: &World, b: &World) -> Option<Self> {
         let all = 0..a.bodies.len().max(b.bodies.len());
         all.into_iter().find_map(|body| {
-            let handles = [a, b].map(|world| world.bodies.handle(body));
-            if handles[0] != handles[1] {
-                let values = handles.map(|handle| f32::from(u8::from(handle.is_some())));
-                return Some(Self { body, quantity: "presence", values });
+            let bodies = [a, b].map(|world| world.bodies.handle(body));
+            if bodies[0] != bodies[1] {
+                let values = bodies.map(|body| f32::from(u8::from(body.is_some())));
+                return Some(Self { bodies, quantity: "presence", values });
             }
             let (x, y) = (numbers(a.bodies.get(body)?), numbers(b.bodies.get(body)?));
             let k = x.iter().zip(&y).position(|(x, y)| x.to_bits() != y.to_bits())?;
-            Some(Self { body, quantity: QUANTITIES[k], values: [x[k], y[k]] })
+            Some(Self { bodies, quantity: QUANTITIES[k], values: [x[k], y[k]] })
         })
     }
 }
@@ -136,7 +145,8 @@ impl BodyDifference {
 impl std::fmt::Display for BodyDifference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [x, y] = self.values;
-        write!(f, "body {}, {}: {x:?} and {y:?}", self.body, self.quantity)
+        let body = self.bodies[0].or(self.bodies[1]).map_or(0, BodyHandle::index);
+        write!(f, "body {body}, {}: {x:?} and {y:?}", self.quantity)
     }
 }
 

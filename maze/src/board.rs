@@ -23,9 +23,8 @@ const SEGMENTS: u16 = 24;
 const RATE: f32 = 120.0;
 
 // Indices of the bodies in the world of [`scene`].
-pub const BOARD: usize = 0;
-pub const GOAL: usize = 1;
-pub const BALL: usize = 3;
+pub(crate) const BOARD: usize = 0;
+pub(crate) const BALL: usize = 3;
 
 /// The world of a map: kinematic board, goal and lids of the walls around the origin, and the ball at rest on the
 /// start. Rows lie along z and columns along x. The floor is at y = 0.

@@ -109,7 +109,7 @@ impl Game {
         })
     }
 
-    /// Board and ball are the bodies [`BOARD`] and [`BALL`].
+    /// Its bodies are named `board`, `goal`, `walls` and `ball`.
     pub fn world(&self) -> &World {
         self.engine.world()
     }

@@ -6,7 +6,7 @@ mod map;
 mod pilot;
 mod script;
 
-pub use board::{BALL, BOARD, CELL, GOAL, RADIUS, scene};
+pub use board::{CELL, RADIUS, scene};
 pub use game::{Engine, Game, Outcome, Played, SAMPLES, Sample, Slip, play};
 pub use map::{BOARDS, Cell, Map};
 pub use pilot::pilot;

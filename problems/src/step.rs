@@ -11,11 +11,11 @@ use crate::residuals::Residuals;
 /// [`ContactProblem::of_step`]. The problem has no contacts if no awake body touches another.
 ///
 /// ```
-/// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// # use drystone::{Body, Shape, Simulation, World};
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// let (problem, _) = drystone_problems::step_with_contacts(&mut simulation, "a ball", 1.0 / 60.0)?;
 /// assert_eq!((problem.name.as_str(), problem.contacts.len()), ("a ball", 1));
 /// # Ok::<(), drystone::Error>(())
@@ -33,11 +33,11 @@ pub fn step_with_contacts(simulation: &mut Simulation, name: &str, dt: f32) -> R
 /// computes that substep a second time. The residuals are zero if no awake body touches another.
 ///
 /// ```
-/// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// # use drystone::{Body, Shape, Simulation, World};
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// assert!(drystone_problems::step_with_residuals(&mut simulation, 1.0 / 60.0)?.e_vel < 1e-3);
 /// # Ok::<(), drystone::Error>(())
 /// ```

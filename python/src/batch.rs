@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use drystone::backend::{BackendChoice, choose};
-use drystone::batch::{Column, Contacts, Member, Run, write};
+use drystone::batch::{Column, Contacts, EventRow, Member, Run, write};
 use drystone::glam::Vec3;
 use drystone::queries::Filter;
 use drystone::{Listen, Result as Outcome, SolverConfig, World};
@@ -373,8 +373,11 @@ impl Batch {
     /// World, kind, bodies (-1 for none) and value of each event of the last step.
     fn events(&self, worlds: Worlds<'_>) -> PyResult<Vec<Event>> {
         let all = self.lock().events(&indices(&worlds)?).map_err(raised)?;
-        let body = |body: Option<u32>| body.map_or(-1, i64::from);
-        Ok(all.into_iter().map(|event| (event.world, event.kind, body(event.a), body(event.b), event.value)).collect())
+        let row = |event: EventRow| {
+            let [a, b] = event.bodies.map(|body| body.map_or(-1, |body| body.index() as i64));
+            (event.world, event.kind, a, b, event.value)
+        };
+        Ok(all.into_iter().map(row).collect())
     }
 
     /// The first hits of rays: writes bodies (-1 for none), distances and normals.

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 
-use drystone::stages::math::rotation::{about, product, unit};
+use drystone::stages::math::{about, product, unit};
 use drystone::world::Collider;
 use drystone::{Axis, Body, BodyHandle, Bounds, Character, Drive, Result, Simulation, World};
 
@@ -22,13 +22,13 @@ const MAX_LATERAL: f32 = 4.0;
 /// same bits. The value is the whole state: a copy of it belongs to a snapshot of the simulation.
 ///
 /// ```
-/// use drystone::{Reference, Simulation, SolverConfig};
+/// use drystone::Simulation;
 /// use drystone_scenes::{Driver, Scene};
 ///
 /// let scene = Scene::find("course", &[])?;
 /// let mut driver: Driver = scene.driver.expect("a character");
 /// assert!(driver.can_jump() && !driver.is_driving());
-/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(scene.world)?;
 /// driver.steer(1.0, 0.0, false);
 /// assert!(driver.is_driving());
 /// for _ in 0..60 {

@@ -117,10 +117,10 @@ impl Scene {
         let spawner = |s: &Spawner| Spawner { world: worlds + s.world, ..s.clone() };
         self.spawners.extend(other.spawners.iter().map(spawner));
         self.world.beside(&other.world);
-        let leaving =
-            |&(body, leaves): &(BodyHandle, Leaves)| Some((self.world.bodies.handle(first + body.index())?, leaves));
+        let appended = |body: &BodyHandle| self.world.bodies.handle(first + body.index());
+        let leaving = |(body, leaves): &(BodyHandle, Leaves)| Some((appended(body)?, *leaves));
         self.leaving.extend(other.leaving.iter().filter_map(leaving));
-        let moved = |g: &Group| Group { name: g.name.clone(), bodies: first + g.bodies.start..first + g.bodies.end };
+        let moved = |g: &Group| Group { name: g.name.clone(), bodies: g.bodies.iter().filter_map(appended).collect() };
         self.groups.extend(other.groups.iter().map(moved));
         self.container = self.container.filter(|c| other.container == Some(*c));
         self.stands &= other.stands;

@@ -8,7 +8,7 @@ use std::io::Write;
 
 use drystone::stages::error::{ensure, input};
 use drystone::stages::input::{InputReader, InputWriter, StepInput, hash_of, hashes};
-use drystone::{Backend, Error, Reference, Result, Simulation, StepStats, World};
+use drystone::{Backend, BodyHandle, Error, Reference, Result, Simulation, StepStats, World};
 
 /// How often a recording adds a hash of all bodies and a whole state (steps).
 ///
@@ -37,13 +37,13 @@ impl Default for RecordingIntervals {
 /// Records a simulation, step by step.
 ///
 /// ```
-/// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, Cpu, Shape, Simulation, World};
 /// use drystone_scenes::{Recorder, RecordingIntervals, Replay};
 ///
 /// let mut world = World::new();
 /// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// let mut recorder = Recorder::new(Vec::new(), "a ball", &mut simulation, RecordingIntervals::default())?;
 /// for step in 0..40 {
 ///     if step == 20 {
@@ -53,7 +53,7 @@ impl Default for RecordingIntervals {
 /// }
 /// let bytes = recorder.finish()?;
 /// let mut replay = Replay::read(&bytes)?;
-/// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+/// let mut again = replay.begin(Box::new(Cpu::new()))?;
 /// replay.seek(&mut again, 40)?;
 /// assert_eq!(again.hash(), simulation.hash());
 /// assert!(replay.first_difference().is_none());
@@ -111,18 +111,18 @@ impl<W: Write> Recorder<W> {
     /// Like [`Self::step`], for a web page ([`Simulation::step_async`]).
     ///
     /// ```
-    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// # use drystone::{Body, Cpu, Shape, Simulation, World};
     /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
     /// # let mut world = World::new();
     /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-    /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// # let mut simulation = Simulation::new(world)?;
     /// # pollster::block_on(async {
     /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
     /// for _ in 0..10 {
     ///     recorder.step_async(&mut simulation, 0.01).await?;
     /// }
     /// let mut replay = Replay::read(&recorder.finish()?)?;
-    /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+    /// let mut again = replay.begin(Box::new(Cpu::new()))?;
     /// while replay.step_async(&mut again).await?.is_some() {}
     /// assert!(again.hash() == simulation.hash() && replay.first_difference().is_none());
     /// # Ok::<(), drystone::Error>(())
@@ -189,18 +189,18 @@ impl Recorder<Vec<u8>> {
     /// A complete copy of the recording up to now. The recorder can go on.
     ///
     /// ```
-    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// # use drystone::{Body, Cpu, Shape, Simulation, World};
     /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
     /// # let mut world = World::new();
     /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-    /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// # let mut simulation = Simulation::new(world)?;
     /// let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, RecordingIntervals::default())?;
     /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
     /// let (half, hash) = (recorder.ended()?, simulation.hash());
     /// (0..5).try_for_each(|_| recorder.step(&mut simulation, 0.01).map(drop))?;
     /// assert!(recorder.so_far().len() > half.len());
     /// let mut replay = Replay::read(&half)?;
-    /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+    /// let mut again = replay.begin(Box::new(Cpu::new()))?;
     /// replay.seek(&mut again, 9)?;
     /// assert_eq!((replay.len(), again.hash(), replay.first_difference()), (5, hash, None));
     /// assert_eq!(Replay::read(&recorder.finish()?)?.len(), 10);
@@ -234,11 +234,11 @@ fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
 /// The first difference between a replay and its recording.
 ///
 /// ```
-/// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// # use drystone::{Body, Cpu, Shape, Simulation, World};
 /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
 /// # let mut world = World::new();
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// # let intervals = RecordingIntervals { hash: 1, state: 4 };
 /// # let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, intervals)?;
 /// # let mut hashes = Vec::new();
@@ -248,13 +248,14 @@ fn write_end(out: &mut impl Write, world: &World) -> Result<()> {
 /// # }
 /// # let bytes = recorder.finish()?;
 /// let mut replay = Replay::read(&bytes)?;
-/// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+/// let mut again = replay.begin(Box::new(Cpu::new()))?;
 /// replay.seek(&mut again, 6)?;
 /// // Disturb the replay.
 /// again.world.bodies[0].linear_velocity.x = 1.0;
 /// replay.step(&mut again)?;
 /// let difference: drystone_scenes::ReplayDifference = replay.first_difference().expect("the bodies differ");
-/// assert_eq!((difference.step, difference.agreed, difference.body, difference.bodies), (7, 6, Some(0), 1));
+/// let first = again.world.bodies.handle(0);
+/// assert_eq!((difference.step, difference.agreed, difference.body, difference.bodies), (7, 6, first, 1));
 /// # let _ = hashes;
 /// # Ok::<(), drystone::Error>(())
 /// ```
@@ -265,10 +266,16 @@ pub struct ReplayDifference {
     pub step: u32,
     /// The last earlier step after which the hashes agreed; 0 for the beginning.
     pub agreed: u32,
-    /// Index of the first body that differs, or `None` if the short hashes of the bodies all agree.
-    pub body: Option<usize>,
+    /// The first body that differs, or `None` if the short hashes of the bodies all agree. Written as its index.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "as_index"))]
+    pub body: Option<BodyHandle>,
     /// Lower bound on the number of bodies that differ.
     pub bodies: usize,
+}
+
+#[cfg(feature = "serde")]
+fn as_index<S: serde::Serializer>(body: &Option<BodyHandle>, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serde::Serialize::serialize(&body.map(BodyHandle::index), serializer)
 }
 
 /// A whole state of a recording.
@@ -283,11 +290,11 @@ struct KeptState {
 /// Replays a recording in a simulation of the caller.
 ///
 /// ```
-/// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+/// # use drystone::{Body, Cpu, Shape, Simulation, World};
 /// # use drystone_scenes::{Recorder, RecordingIntervals, Replay};
 /// # let mut world = World::new();
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// # let intervals = RecordingIntervals { hash: 1, state: 4 };
 /// # let mut recorder = Recorder::new(Vec::new(), "a fall", &mut simulation, intervals)?;
 /// # let mut hashes = Vec::new();
@@ -462,7 +469,7 @@ impl Replay {
                 self.agreed = self.agreed.max(self.step);
             } else if self.difference.is_none_or(|known| known.step > self.step) {
                 let own = simulation.world.bodies.handles().zip(own.1.iter().zip(bodies));
-                let differ: Vec<usize> = own.filter(|(_, (a, b))| a != b).map(|(body, _)| body.index()).collect();
+                let differ: Vec<BodyHandle> = own.filter(|(_, (a, b))| a != b).map(|(body, _)| body).collect();
                 let (step, agreed) = (self.step, self.agreed);
                 self.difference =
                     Some(ReplayDifference { step, agreed, body: differ.first().copied(), bodies: differ.len().max(1) });
@@ -485,18 +492,18 @@ impl Replay {
     /// Like [`Self::seek`], for a web page.
     ///
     /// ```
-    /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// use drystone::{Body, Cpu, Shape, Simulation, World};
     /// use drystone_scenes::{Recorder, RecordingIntervals, Replay};
     ///
     /// let mut world = World::new();
     /// world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// let mut recorder = Recorder::new(Vec::new(), "a ball", &mut simulation, RecordingIntervals::default())?;
     /// recorder.step(&mut simulation, 0.01)?;
     /// let after_one = simulation.hash();
     /// recorder.step(&mut simulation, 0.01)?;
     /// let mut replay = Replay::read(&recorder.finish()?)?;
-    /// let mut again = replay.begin(Box::new(Reference::<f32>::new()))?;
+    /// let mut again = replay.begin(Box::new(Cpu::new()))?;
     /// pollster::block_on(replay.seek_async(&mut again, 1))?;
     /// assert_eq!((again.hash(), replay.step_number()), (after_one, 1));
     /// # Ok::<(), drystone::Error>(())

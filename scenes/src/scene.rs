@@ -1,7 +1,5 @@
 //! A scene: a world, the length of a step, and the expected outcome.
 
-use std::ops::Range;
-
 use glam::Vec3;
 
 use super::driver::Driver;
@@ -63,8 +61,8 @@ pub struct Scene {
 pub struct Group {
     /// Name for reports.
     pub name: String,
-    /// Their indices.
-    pub bodies: Range<usize>,
+    /// Its bodies.
+    pub bodies: Vec<BodyHandle>,
 }
 
 impl Scene {

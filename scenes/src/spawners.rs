@@ -10,14 +10,14 @@ use drystone::{Body, BodyHandle, BodyKind, World};
 ///
 /// ```
 /// use drystone_scenes::{Leaves, Spawner, Spawners};
-/// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, Shape, Simulation, World};
 /// use drystone_scenes::Scene;
 ///
 /// let mut scene = Scene::new("rain", World::new(), 60);
 /// let drop = Body::dynamic().shape(Shape::ball(0.05)).position(0.0, 1.0, 0.0);
 /// scene.spawners.push(Spawner { leaves: Leaves { below: Some(0.0), after: None }, ..Spawner::new(drop, 10) });
 /// let mut spawners = Spawners::new(&scene);
-/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(scene.world)?;
 /// for _ in 0..60 {
 ///     spawners.before_step(&mut simulation.world, scene.dt);
 ///     simulation.step(scene.dt)?;

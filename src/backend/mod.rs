@@ -24,11 +24,11 @@ pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + '
 /// An implementation that can run the passes of a plan.
 ///
 /// ```
-/// use drystone::{Backend, Reference, Simulation, SolverConfig};
+/// use drystone::{Backend, Simulation};
 /// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &["n=3".into()])?;
-/// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(scene.world)?;
 /// let (mut problem, plan) = simulation.next_problem(scene.dt)?;
 /// let mut backend: Box<dyn Backend> = Box::new(drystone::Cpu::new());
 /// assert!(!backend.adapter().is_empty() && !backend.keeps_rows() && backend.time_kernels()?.is_none());

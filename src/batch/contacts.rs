@@ -2,6 +2,7 @@
 
 use super::Member;
 use crate::simulation::{Contact, Event, Hit};
+use crate::world::{BodyHandle, JointHandle};
 
 /// Contacts of some worlds. The contacts of one world are contiguous, in the order of the requested worlds, and so are
 /// the points of one contact. Within a world, contacts are sorted by pairs of bodies. The order is the same on every
@@ -90,8 +91,16 @@ fn order(contact: &Contact) -> impl Ord + use<> {
 ///     world.simulation_mut().listen(Listen { contacts: true, ..Listen::default() })?;
 /// }
 /// batch.step(1, &[0, 1])?;
-/// let began = |world| EventRow { world, kind: "began", a: Some(0), b: Some(1), value: 0.0 };
-/// assert_eq!(batch.events(&[0, 1])?, [began(0), began(1)]);
+/// let events = batch.events(&[0, 1])?;
+/// let body = |i: usize| batch.world(i / 2).simulation().world.bodies.handle(i % 2);
+/// let began = |world| EventRow {
+///     world,
+///     kind: "began",
+///     bodies: [body(2 * world as usize), body(2 * world as usize + 1)],
+///     joint: None,
+///     value: 0.0,
+/// };
+/// assert_eq!(events, [began(0), began(1)]);
 /// # Ok::<(), drystone::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,10 +109,10 @@ pub struct EventRow {
     pub world: u32,
     /// One of began, ended, hit, entered, left, passed and broke.
     pub kind: &'static str,
-    /// The body with the smaller index, or the body of the sensor; `None` for a joint.
-    pub a: Option<u32>,
-    /// The other body.
-    pub b: Option<u32>,
+    /// The body with the smaller index, or the body of the sensor, and the other body; `None` for a joint.
+    pub bodies: [Option<BodyHandle>; 2],
+    /// The joint that broke.
+    pub joint: Option<JointHandle>,
     /// Speed of a hit (m/s), time of a passage within the step (s), or force on a broken joint (N); else 0.
     pub value: f32,
 }
@@ -119,7 +128,8 @@ pub(super) fn events(world: usize, member: &Member) -> impl Iterator<Item = Even
             Event::Passed { sensor, visitor, time } => ("passed", Some((sensor, visitor)), *time),
             Event::Broke { force, .. } => ("broke", None, *force),
         };
-        let [a, b] = bodies.map_or([None; 2], |(a, b)| [a, b].map(|side| Some(side.body.index() as u32)));
-        EventRow { world: world as u32, kind, a, b, value }
+        let bodies = bodies.map_or([None; 2], |(a, b)| [a, b].map(|side| Some(side.body)));
+        let joint = if let Event::Broke { joint, .. } = event { Some(*joint) } else { None };
+        EventRow { world: world as u32, kind, bodies, joint, value }
     })
 }

@@ -47,7 +47,7 @@ use surroundings::{Footing, Glide, Surroundings, Touch};
 /// world.insert(Body::fixed().shape(Shape::cuboid(0.5, 0.15, 2.0)).position(2.0, 0.15, 0.0).named("a step"));
 /// let capsule = Body::kinematic().shape(Shape::capsule(0.6, 0.3)).position(0.0, 0.906, 0.0);
 /// let mut character = Character::new(world.insert(capsule));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// for _ in 0..60 {
 ///     let movement = character.walk(&mut simulation, Vec3::X * 2.0, 1.0 / 60.0)?;
 ///     assert!(movement.ground.is_some());
@@ -104,7 +104,7 @@ pub struct Ground {
 /// let lift = world.insert(lift);
 /// let ball = world.insert(Body::kinematic().shape(Shape::ball(0.5)).position(0.0, 1.01, 0.0));
 /// let mut character = Character::new(ball);
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// character.walk(&mut simulation, Vec3::ZERO, 0.1)?;
 /// simulation.step(0.1)?;
 /// let Movement { translation, ground, contacts } = character.walk(&mut simulation, Vec3::ZERO, 0.1)?;
@@ -191,7 +191,7 @@ impl Character {
     /// let mut world = World::new();
     /// let ball = world.insert(Body::kinematic().shape(Shape::ball(0.5)));
     /// let mut character = Character::new(ball);
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// character.launch(Vec3::Y * 4.905);
     /// assert!(character.ground().is_none());
     /// for _ in 0..10 {

@@ -103,18 +103,18 @@ impl<'a> Queries<'a> {
         Self { world, parts: detector.places(world) }
     }
 
-    /// The first collider that a ray meets within the distance `most`. A ray that starts inside a collider meets it at
+    /// The first collider that a ray meets within `max_distance` (m). A ray that starts inside a collider meets it at
     /// distance 0, with a normal against the ray. The direction can have any length above 0.
-    pub fn ray(&self, origin: Vec3, direction: Vec3, most: f32, filter: &Filter) -> Option<Hit> {
+    pub fn ray(&self, origin: Vec3, direction: Vec3, max_distance: f32, filter: &Filter) -> Option<Hit> {
         let mut nearest = None;
-        self.along_ray(origin, direction, most, filter, |hit| keep_nearest(&mut nearest, hit));
+        self.along_ray(origin, direction, max_distance, filter, |hit| keep_nearest(&mut nearest, hit));
         nearest
     }
 
-    /// All colliders that a ray meets within the distance `most`, each where the ray enters it, nearest first.
-    pub fn ray_all(&self, origin: Vec3, direction: Vec3, most: f32, filter: &Filter) -> Vec<Hit> {
+    /// All colliders that a ray meets within `max_distance` (m), each where the ray enters it, nearest first.
+    pub fn ray_all(&self, origin: Vec3, direction: Vec3, max_distance: f32, filter: &Filter) -> Vec<Hit> {
         let mut hits = Vec::new();
-        self.along_ray(origin, direction, most, filter, |hit| {
+        self.along_ray(origin, direction, max_distance, filter, |hit| {
             hits.push(hit);
             f32::INFINITY
         });
@@ -136,20 +136,20 @@ impl<'a> Queries<'a> {
         found
     }
 
-    /// The collider whose surface is nearest to a point, up to the distance `most`. The distance is negative inside a
+    /// The collider whose surface is nearest to a point, up to `max_distance` (m). The distance is negative inside a
     /// collider, so the collider that contains the point most deeply is the nearest.
-    pub fn closest(&self, point: Vec3, most: f32, filter: &Filter) -> Option<Hit> {
+    pub fn closest(&self, point: Vec3, max_distance: f32, filter: &Filter) -> Option<Hit> {
         let mut nearest = None;
-        let part = self.part(filter).filter(|_| is_place(point) && most >= 0.0)?;
+        let part = self.part(filter).filter(|_| is_place(point) && max_distance >= 0.0)?;
         let mut visit = |place: Place| {
             let found = self.accepted(place, filter).and_then(|(body, collider, own)| {
                 let (distance, on, normal) = shapes::closest(&collider.shape, &own, point)?;
                 let hit = Hit { body, collider: place.collider as usize, distance, point: on, normal };
-                (distance <= most).then_some(hit)
+                (distance <= max_distance).then_some(hit)
             });
             found.map_or(f32::INFINITY, |hit| keep_nearest(&mut nearest, hit))
         };
-        let mut limit = most.min(MAX_LENGTH * 8.0);
+        let mut limit = max_distance.min(MAX_LENGTH * 8.0);
         for &plane in &part.planes {
             limit = limit.min(visit(plane));
         }
@@ -220,7 +220,7 @@ impl<'a> Queries<'a> {
         contacts
     }
 
-    /// The first collider that a shape meets on its way from a pose along a direction, within the distance `most`. The
+    /// The first collider that a shape meets on its way from a pose along a direction, within `max_distance` (m). The
     /// shape does not rotate. A shape that overlaps a collider at the start meets it at distance 0.
     pub fn cast(
         &self,
@@ -228,7 +228,7 @@ impl<'a> Queries<'a> {
         position: Vec3,
         rotation: Quat,
         direction: Vec3,
-        most: f32,
+        max_distance: f32,
         filter: &Filter,
     ) -> Option<Hit> {
         let (own, (lower, upper)) = placed(shape, position, rotation)?;
@@ -237,7 +237,7 @@ impl<'a> Queries<'a> {
         let mut nearest = None;
         self.along(
             &ray,
-            most,
+            max_distance,
             filter,
             |hit| keep_nearest(&mut nearest, hit),
             |collider, pose, range| shapes::cast((&collider.shape, pose), (shape, &own), &ray, range),
@@ -246,37 +246,44 @@ impl<'a> Queries<'a> {
     }
 
     /// Calls `found` for each collider that a ray meets. The function returns the new distance limit.
-    fn along_ray(&self, origin: Vec3, direction: Vec3, most: f32, filter: &Filter, found: impl FnMut(Hit) -> f32) {
+    fn along_ray(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        max_distance: f32,
+        filter: &Filter,
+        found: impl FnMut(Hit) -> f32,
+    ) {
         if let Some(ray) = BoxRay::new(origin, direction, Vec3::ZERO) {
             let meets = |collider: &Collider, pose: &Pose, range| {
                 let (distance, normal) = shapes::ray(&collider.shape, pose, &ray, range)?;
                 Some((distance, ray.at(distance), normal))
             };
-            self.along(&ray, most, filter, found, meets);
+            self.along(&ray, max_distance, filter, found, meets);
         }
     }
 
     /// The same for anything that moves along a ray. `meets` gives distance, point and normal on a collider. It
-    /// searches from the distance at which the motion enters the collider's box, up to `most`.
+    /// searches from the distance at which the motion enters the collider's box, up to `max_distance`.
     fn along(
         &self,
         ray: &BoxRay,
-        most: f32,
+        max_distance: f32,
         filter: &Filter,
         mut found: impl FnMut(Hit) -> f32,
         meets: impl Fn(&Collider, &Pose, [f32; 2]) -> Option<(f32, Vec3, Vec3)>,
     ) {
-        let Some(part) = self.part(filter).filter(|_| most >= 0.0) else { return };
-        let most = most.min(MAX_LENGTH * 8.0);
+        let Some(part) = self.part(filter).filter(|_| max_distance >= 0.0) else { return };
+        let max_distance = max_distance.min(MAX_LENGTH * 8.0);
         let mut visit = |place: Place, enters: f32| {
             let hit = self.accepted(place, filter).and_then(|(body, collider, pose)| {
-                let (distance, point, normal) = meets(collider, &pose, [enters, most])?;
-                let is_number = distance <= most && point.is_finite() && normal.is_finite();
+                let (distance, point, normal) = meets(collider, &pose, [enters, max_distance])?;
+                let is_number = distance <= max_distance && point.is_finite() && normal.is_finite();
                 is_number.then_some(Hit { body, collider: place.collider as usize, distance, point, normal })
             });
             hit.map_or(f32::INFINITY, &mut found)
         };
-        let mut limit = most;
+        let mut limit = max_distance;
         for &plane in &part.planes {
             limit = limit.min(visit(plane, 0.0));
         }
@@ -375,7 +382,7 @@ fn placed(shape: &Shape, position: Vec3, rotation: Quat) -> Option<(Pose, (Vec3,
     is_pose.then(|| {
         let own = pose(position, rotation);
         let aabb = shape.0.compute_aabb(&own);
-        let most = Vec3::splat(8.0 * MAX_LENGTH);
-        (own, (aabb.mins.max(-most), aabb.maxs.min(most)))
+        let far = Vec3::splat(8.0 * MAX_LENGTH);
+        (own, (aabb.mins.max(-far), aabb.maxs.min(far)))
     })
 }

@@ -16,7 +16,7 @@ use crate::world::World;
 /// let mut world = World::new();
 /// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// let brick = world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5)).position(0.0, 0.5, 0.0));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// (0..10).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let contact: Contact = simulation.contacts().next().expect("the brick lies on the floor");
@@ -46,7 +46,7 @@ pub struct Contact {
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(2.0, 0.5, 0.0));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// simulation.step(1.0 / 60.0)?;
 /// let contact = simulation.contacts().next().expect("a ball on the floor");
 /// let ContactPoint { position, separation, .. } = contact.points()[0];

@@ -14,9 +14,9 @@ use crate::world::{BodyHandle, JointHandle};
 /// [`SolvedPoint::summed`](crate::SolvedPoint::summed) is available, and forces of joints are means over the step.
 ///
 /// ```
-/// use drystone::{Listen, Reference, Simulation, SolverConfig, World};
+/// use drystone::{Listen, Simulation, World};
 ///
-/// let mut simulation = Simulation::with(World::new(), SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(World::new())?;
 /// simulation.listen(Listen { hits_above: Some(0.5), ..Listen::default() })?;
 /// assert!(simulation.listen(Listen { hits_above: Some(-1.0), ..Listen::default() }).is_err());
 /// assert_eq!(simulation.listening().hits_above, Some(0.5));
@@ -51,12 +51,12 @@ impl Listen {
 /// A collider: its body, and its index on that body.
 ///
 /// ```
-/// use drystone::{Body, ColliderOf, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, ColliderOf, Shape, Simulation, World};
 ///
 /// let mut world = World::new();
 /// let room = world.insert(Body::fixed().sensor(Shape::cuboid(1.0, 1.0, 1.0)));
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// simulation.step(1.0 / 60.0)?;
 /// let [sensor, visitor] = [room, ball].map(|body| ColliderOf { body, collider: 0 });
 /// assert_eq!(simulation.overlaps(), [[sensor, visitor]]);
@@ -79,7 +79,7 @@ crate::saved::fields!(ColliderOf { body, collider });
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// simulation.listen(Listen { contacts: true, ..Listen::default() })?;
 /// let mut landed = false;
 /// for _ in 0..60 {
@@ -154,7 +154,7 @@ pub enum Event {
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.8, 0.0));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// simulation.listen(Listen { hits_above: Some(1.0), ..Listen::default() })?;
 /// let mut hits: Vec<Hit> = Vec::new();
 /// for _ in 0..60 {

@@ -23,7 +23,7 @@ use crate::world::{Body, Material, World};
 /// it was.
 ///
 /// ```
-/// use drystone::{Body, BodyHandle, ColliderOf, ContactHooks, PendingContact, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, BodyHandle, ColliderOf, ContactHooks, PendingContact, Shape, Simulation, World};
 /// use drystone::glam::Vec3;
 ///
 /// /// Bodies with a common name pass through each other, and the floor is icy where x is above 0.
@@ -48,7 +48,7 @@ use crate::world::{Body, Material, World};
 /// let [rough, icy] = [-10.0, 10.0].map(|x| world.insert(slider().position(x, 0.5, 0.0)));
 /// let ghost = world.insert(slider().named("ghost").position(20.0, 0.5, 0.0));
 /// world.insert(slider().named("ghost").position(20.5, 0.5, 0.0));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// simulation.set_hooks(Some(Box::new(Rules)));
 /// (0..30).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let speed = |body: BodyHandle| simulation.world.bodies[body].linear_velocity.x;
@@ -77,7 +77,7 @@ pub trait ContactHooks: Send + Sync {
 /// A contact that a step has found but not yet solved, over one pair of convex parts: see [`ContactHooks::modify`].
 ///
 /// ```
-/// use drystone::{Body, BodyHandle, ContactHooks, PendingContact, PendingPoint, Reference, Shape, Simulation, SolverConfig, World};
+/// use drystone::{Body, BodyHandle, ContactHooks, PendingContact, PendingPoint, Shape, Simulation, World};
 /// use drystone::glam::Vec3;
 ///
 /// /// A platform holds what comes down on it.
@@ -97,7 +97,7 @@ pub trait ContactHooks: Send + Sync {
 /// let platform = world.insert(Body::fixed().shape(Shape::cuboid(2.0, 0.1, 2.0)));
 /// let ball = |y: f32| Body::dynamic().shape(Shape::ball(0.2)).position(0.0, y, y);
 /// let [rises, falls] = [(-1.0, 2.0), (1.0, -2.0)].map(|(y, v)| world.insert(ball(y).velocity(Vec3::Y * v, Vec3::ZERO)));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// simulation.set_hooks(Some(Box::new(OneWay(platform))));
 /// (0..60).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// assert!((simulation.world.bodies[rises].position.y - 1.0).abs() < 1e-3);

@@ -15,7 +15,7 @@ use crate::world::World;
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let manifold: SolvedManifold = simulation.manifolds().next().expect("a ball on the floor");
@@ -59,7 +59,7 @@ pub struct SolvedManifold {
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let manifold = simulation.manifolds().next().expect("a ball on the floor");
@@ -94,7 +94,7 @@ pub struct SolvedPoint {
 /// # let mut world = World::new();
 /// # world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(6.0).position(0.0, 0.5, 0.0));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// # simulation.listen(Listen { impulses: true, ..Listen::default() })?;
 /// # (0..20).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
 /// let manifold = simulation.manifolds().next().expect("a ball on the floor");

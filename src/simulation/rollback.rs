@@ -16,7 +16,7 @@ use crate::error::{Result, input};
 /// let mut world = World::new();
 /// world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)));
 /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 0.5, 0.0));
-/// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// let mut simulation = Simulation::new(world)?;
 /// let mut rollback = Rollback::new(8);
 /// for _ in 0..20 {
 ///     rollback.push(&simulation);

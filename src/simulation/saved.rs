@@ -10,10 +10,10 @@ use crate::world::World;
 /// The state of a simulation between two steps, in memory: [`Simulation::snapshot`].
 ///
 /// ```
-/// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+/// # use drystone::{Body, Shape, Simulation, World};
 /// # let mut world = World::new();
 /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-/// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+/// # let mut simulation = Simulation::new(world)?;
 /// let mut state: drystone::Snapshot = simulation.snapshot();
 /// simulation.step(1.0 / 60.0)?;
 /// simulation.snapshot_into(&mut state);
@@ -50,12 +50,12 @@ impl Simulation {
     /// same calls.
     ///
     /// ```
-    /// use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+    /// use drystone::{Body, Cpu, Shape, Simulation, World};
     ///
     /// let mut world = World::new();
     /// world.insert(Body::fixed().shape(Shape::half_space(glam::Vec3::Y)));
     /// world.insert(Body::dynamic().shape(Shape::ball(0.5)).position(0.0, 2.0, 0.0));
-    /// let mut one = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut one = Simulation::new(world)?;
     /// one.step(1.0 / 60.0)?;
     /// let mut other = one.fork(Box::new(Cpu::new()));
     /// one.step(1.0 / 60.0)?;
@@ -76,10 +76,10 @@ impl Simulation {
     /// A snapshot of the state between two steps.
     ///
     /// ```
-    /// # use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World};
+    /// # use drystone::{Body, Shape, Simulation, World};
     /// # let mut world = World::new();
     /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-    /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// # let mut simulation = Simulation::new(world)?;
     /// let before = simulation.snapshot();
     /// simulation.step(1.0 / 60.0)?;
     /// let after = simulation.hash();
@@ -129,10 +129,10 @@ impl Simulation {
     /// first steps can fail.
     ///
     /// ```
-    /// # use drystone::{Body, Cpu, Reference, Shape, Simulation, SolverConfig, World};
+    /// # use drystone::{Body, Cpu, Shape, Simulation, World};
     /// # let mut world = World::new();
     /// # world.insert(Body::dynamic().shape(Shape::ball(0.5)));
-    /// # let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// # let mut simulation = Simulation::new(world)?;
     /// let bytes = simulation.save();
     /// let mut again = Simulation::load(&bytes, Box::new(Cpu::new()))?;
     /// simulation.step(1.0 / 60.0)?;

@@ -84,14 +84,14 @@ impl BodyHandle {
 /// let [a, b] = ["a", "b"].map(|name| world.insert(Body::fixed().named(name)));
 /// world.remove(a);
 /// let bodies: &Bodies = &world.bodies;
-/// assert!(bodies.is_vacant(0) && !bodies.contains(a) && bodies.contains(b));
+/// assert!(!bodies.contains(a) && bodies.contains(b));
 /// assert_eq!((bodies.len(), bodies.count(), bodies.world_count()), (2, 1, 1));
 /// assert_eq!((bodies.handle(0), bodies.handle(1)), (None, Some(b)));
 /// assert!(bodies.handles().eq([b]));
 /// assert_eq!(bodies.worlds(), [0, 0]);
 ///
 /// world.bodies.iter_mut().for_each(|body| body.material.friction = 0.2);
-/// world.bodies.get_mut(1).expect("b").material.friction = 0.8;
+/// world.body_mut(b).expect("b").material.friction = 0.8;
 /// assert_eq!([0, 1].map(|i| world.bodies[i].material.friction), [0.2, 0.8]);
 /// ```
 ///
@@ -294,7 +294,7 @@ impl Bodies {
     }
 
     /// A mutable body by its index. Returns `None` beyond the last index.
-    pub fn get_mut(&mut self, index: usize) -> Option<&mut Body> {
+    pub(crate) fn get_mut(&mut self, index: usize) -> Option<&mut Body> {
         self.all.get_mut(index)
     }
 
@@ -325,7 +325,7 @@ impl Bodies {
     }
 
     /// Whether no body is at an index.
-    pub fn is_vacant(&self, index: usize) -> bool {
+    pub(crate) fn is_vacant(&self, index: usize) -> bool {
         self.handle(index).is_none()
     }
 

@@ -558,12 +558,12 @@ impl Body {
     /// inside: they overlap only shapes that cross their surface.
     ///
     /// ```
-    /// use drystone::{Body, Event, Reference, Shape, Simulation, SolverConfig, World};
+    /// use drystone::{Body, Event, Shape, Simulation, World};
     ///
     /// let mut world = World::new();
     /// let gate = world.insert(Body::fixed().sensor(Shape::cuboid(1.0, 0.1, 1.0)));
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(0.0, 1.0, 0.0));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// let mut told = Vec::new();
     /// for _ in 0..60 {
     ///     simulation.step(1.0 / 60.0)?;
@@ -671,7 +671,7 @@ impl Body {
     /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     /// let ball = Body::dynamic().shape(Shape::ball(0.5)).velocity(Vec3::X, Vec3::Y).linear_damping(2.0).angular_damping(1.0);
     /// let ball = world.insert(ball);
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// simulation.step(0.5)?;
     /// let ball = simulation.world.body(ball).expect("still there");
     /// assert!((ball.linear_velocity.x - (-1.0_f32).exp()).abs() < 1e-6);
@@ -1069,7 +1069,7 @@ impl Body {
     /// use drystone::{Body, Reference, Shape, Simulation, SolverConfig, World, glam::Vec3};
     /// let mut world = World { gravity: Vec3::ZERO, ..World::new() };
     /// let ball = world.insert(Body::dynamic().shape(Shape::ball(0.5)).total_mass(2.0));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// simulation.world.body_mut(ball).expect("just put in").apply_force(Vec3::X * 8.0);
     /// simulation.step(0.25)?;
     /// simulation.step(0.25)?;

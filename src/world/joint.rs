@@ -474,7 +474,7 @@ impl Joint {
     /// let mut world = World::new();
     /// let lamp = world.insert(Body::dynamic().shape(Shape::ball(0.1)));
     /// let hook = world.insert_joint(Joint::to_world(lamp, Vec3::ZERO, Vec3::ZERO).enabled(false));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// simulation.step(0.1)?;
     /// assert!(simulation.world.bodies[lamp].position.y < -0.04);
     /// let at = simulation.world.bodies[lamp].position;

@@ -186,7 +186,7 @@ impl Axis {
     /// assert_eq!(Axis::FREE.spring_damper(0.0, 400.0, 40.0, f32::MAX).bounds, Axis::FREE.bounds);
     /// let slider = Joint::to_world(lamp, Vec3::ZERO, Vec3::ZERO).slider(Vec3::Y);
     /// world.insert_joint(slider.spring_damper(0.0, 400.0, 40.0));
-    /// let mut simulation = Simulation::with(world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(world)?;
     /// (0..180).try_for_each(|_| simulation.step(1.0 / 60.0).map(drop))?;
     /// assert!((simulation.world.bodies[lamp].position.y + 0.04905).abs() < 1e-3);
     /// # Ok::<(), drystone::Error>(())

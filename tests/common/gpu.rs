@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use drystone::backend::gpu::{AdapterChoice, AdapterSummary, adapters};
 use drystone::stages::backend::CheckedStep;
-use drystone::stages::problem::carry::Carry;
+use drystone::stages::problem::Carry;
 use drystone::stats::{KernelTime, Traffic};
 use drystone::{Backend, Gpu};
 

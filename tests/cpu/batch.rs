@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use drystone::batch::{Batch, Column, Run, State, drives, write};
 use drystone::glam::Vec3;
-use drystone::{BodyKind, Cpu, Joint, Listen, Result, Simulation, SolverConfig, World};
+use drystone::{BodyHandle, BodyKind, Cpu, Joint, Listen, Result, Simulation, SolverConfig, World};
 use drystone_problems::batch::Measure;
 use drystone_problems::step_with_residuals;
 use drystone_scenes::{CATALOGUE, Scene};
@@ -313,7 +313,9 @@ fn contacts_and_measures_do_not_depend_on_neighbors_and_threads() {
         let last = worlds - 1;
         let measures = Measure::values(Measure::ALL, batch.world(last)).map(f64::to_bits);
         let events = batch.events(&[last]).expect("a world").into_iter();
-        let events: Vec<_> = events.map(|event| (event.kind, event.a, event.b, event.value.to_bits())).collect();
+        let events: Vec<_> = events
+            .map(|event| (event.kind, event.bodies.map(|body| body.map(BodyHandle::index)), event.value.to_bits()))
+            .collect();
         (batch.contacts(&[last]).expect("a world"), events, measures)
     };
     let pushed = of(4, 1);

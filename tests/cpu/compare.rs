@@ -173,9 +173,9 @@ fn a_difference_that_no_pass_makes_is_still_a_difference() {
     };
     let found = compare(&scene, &SolverConfig::default().without_sleep(), &mut open, 3, || ()).expect("both run");
     let first = found.first.clone().expect("a difference");
-    let last = scene.world.bodies.len() - 1;
+    let last = scene.world.bodies.handle(scene.world.bodies.len() - 1);
     let values = [first.body.values[0], first.body.values[0] + 1.0 / 60.0];
-    let body = BodyDifference { body: last, quantity: "position.x", values: [values[0], first.body.values[1]] };
+    let body = BodyDifference { bodies: [last; 2], quantity: "position.x", values: [values[0], first.body.values[1]] };
     assert_eq!(first, FirstDifference { step: 1, body, stage: Stage::NotRepeated { not_repeated: true } });
     assert!((first.body.values[1] - values[1]).abs() < 1e-5, "{first}");
     assert_eq!((found.steps[0].bodies, found.differing_steps()), (1, 3));
@@ -214,7 +214,7 @@ fn a_difference_that_heals_is_still_told_with_its_step_its_body_and_both_values(
     world.gravity = drystone::glam::Vec3::ZERO;
     world.insert(Body::fixed().shape(Shape::ball(1.0)).position(9.0, 0.0, 0.0));
     // So far away that half a meter a second for seventeen steps is less than a last bit of the position.
-    world.insert(Body::dynamic().shape(Shape::ball(1.0)).position(0.0, 0.0, 1e9));
+    let body = Some(world.insert(Body::dynamic().shape(Shape::ball(1.0)).position(0.0, 0.0, 1e9)));
     let scene = Scene { world, ..pile() };
     let mut open =
         |which| -> Result<Box<dyn Backend>> { Ok(if which == 0 { reference() } else { Box::new(Healing(0)) }) };
@@ -223,7 +223,7 @@ fn a_difference_that_heals_is_still_told_with_its_step_its_body_and_both_values(
     assert_eq!(found.differing_steps(), 17);
     let first = found.first.expect("a difference");
     assert_eq!(first.step, 3);
-    assert_eq!(first.body, BodyDifference { body: 1, quantity: "velocity.z", values: [0.0, 0.5] });
+    assert_eq!(first.body, BodyDifference { bodies: [body; 2], quantity: "velocity.z", values: [0.0, 0.5] });
     assert!(first.to_string().starts_with("step 3, body 1, velocity.z: 0.0 and 0.5; "), "{first}");
 }
 
@@ -237,7 +237,8 @@ fn a_body_that_is_in_one_world_only_differs() {
     more.insert(drystone::Body::dynamic().shape(drystone::Shape::ball(1.0)));
     for (other, body, values) in [(&fewer, 7, [1.0, 0.0]), (&more, world.bodies.len(), [0.0, 1.0])] {
         assert_eq!(Difference::between(&world, other).bodies, 1);
-        let first = BodyDifference { body, quantity: "presence", values };
+        let bodies = [&world, other].map(|world| world.bodies.handle(body));
+        let first = BodyDifference { bodies, quantity: "presence", values };
         assert_eq!(BodyDifference::first(&world, other), Some(first));
     }
     assert_eq!(BodyDifference::first(&world, &world), None);

@@ -3,19 +3,17 @@
 
 use drystone::config::FrictionRule;
 use drystone::glam::{DMat3, DQuat, DVec3, Mat3, Vec3};
-use drystone::stages::kernels::axis::{Frames, axis_motion};
-use drystone::stages::kernels::contact::{
-    current_separation, normal_movement, restitute_contact, solve_contact, warm_start,
-};
-use drystone::stages::kernels::friction::{solve_friction, solve_twist};
-use drystone::stages::kernels::joint::joint_column;
-use drystone::stages::kernels::pair::{relative_movement, relative_velocity};
+use drystone::stages::kernels::joint_column;
 use drystone::stages::kernels::{
     Axis, Body, Contact, Impulse, Joint, Mass, Pair, Point, Rules, SoftnessOf, StepParams, Sym3,
 };
+use drystone::stages::kernels::{Frames, axis_motion};
+use drystone::stages::kernels::{current_separation, normal_movement, restitute_contact, solve_contact, warm_start};
+use drystone::stages::kernels::{relative_movement, relative_velocity};
+use drystone::stages::kernels::{solve_friction, solve_twist};
 use drystone::stages::math::{Quat, Vec3 as LaneVec3, vec3};
 use drystone::stages::problem::ContactRow;
-use drystone::stages::problem::effective::{EffectiveMass, InverseMass};
+use drystone::stages::problem::{EffectiveMass, InverseMass};
 
 /// Some contact of two bodies in general position.
 struct Case {

@@ -4,7 +4,7 @@ use crate::common::state::reference;
 use std::collections::HashMap;
 
 use drystone::config::FrictionAt;
-use drystone::stages::problem::effective::{EffectiveMass, InverseMass};
+use drystone::stages::problem::{EffectiveMass, InverseMass};
 use drystone::{Backend, Cpu, Simulation, SolverConfig, StepStats, World};
 use drystone_scenes::Scene;
 

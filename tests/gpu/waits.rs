@@ -6,7 +6,7 @@ use std::task::{Context, Poll, Waker};
 use drystone::backend::Running;
 use drystone::backend::gpu::{Faults, GpuOptions, Loss};
 use drystone::stages::backend::CheckedStep;
-use drystone::stages::problem::carry::Carry;
+use drystone::stages::problem::Carry;
 use drystone::{Backend, Gpu, Reference, Result, Simulation, SolverConfig};
 use drystone_scenes::Scene;
 

@@ -102,7 +102,7 @@ type Change = Box<dyn Fn(&mut World) -> bool>;
 /// Changes that may be tried, those that take most away first.
 fn changes(world: &World) -> Vec<Change> {
     let mut all: Vec<Change> = Vec::new();
-    let bodies: Vec<usize> = (0..world.bodies.len()).filter(|&i| !world.bodies.is_vacant(i)).collect();
+    let bodies: Vec<usize> = (0..world.bodies.len()).filter(|&i| world.bodies.handle(i).is_some()).collect();
     for &i in bodies.iter().rev() {
         all.push(Box::new(move |world| without_body(world, i)));
     }

@@ -7,8 +7,8 @@ use crate::camera::Camera;
 use crate::colors::Rgba;
 use crate::show::{Key, Passing, Pointer, Show};
 use drystone::backend::{BackendChoice, choose};
-use drystone::{Result, SolverConfig, World};
-use drystone_maze::{BALL, BOARD, CELL, GOAL, Game, Map, Outcome, TILT_LIMIT};
+use drystone::{Body, Result, SolverConfig, World};
+use drystone_maze::{CELL, Game, Map, Outcome, TILT_LIMIT};
 
 const BOARD_COLOR: Rgba = [226, 202, 160, 255];
 const GOAL_COLOR: Rgba = [92, 170, 96, 255];
@@ -18,9 +18,13 @@ const BALL_COLOR: Rgba = [206, 210, 218, 255];
 const MAX_STEPS: f32 = 12.0;
 
 pub(crate) fn colors(world: &World) -> Vec<Rgba> {
-    let mut colors = vec![WALL_COLOR; world.bodies.len()];
-    (colors[BOARD], colors[GOAL], colors[BALL]) = (BOARD_COLOR, GOAL_COLOR, BALL_COLOR);
-    colors
+    let color = |body: &Body| match body.name.as_str() {
+        "board" => BOARD_COLOR,
+        "goal" => GOAL_COLOR,
+        "ball" => BALL_COLOR,
+        _ => WALL_COLOR,
+    };
+    world.bodies.iter().map(color).collect()
 }
 
 /// The bounds of the board with its rim at any tilt.

@@ -316,7 +316,7 @@ impl Live {
     }
 
     /// The dynamic body under the pointer, even behind other bodies, and its distance from the eye (m).
-    pub fn body_at(&self, Pointer { origin, direction, .. }: Pointer) -> Option<(f32, usize)> {
+    pub fn body_at(&self, Pointer { origin, direction, .. }: Pointer) -> Option<(f32, BodyHandle)> {
         // A recording cannot be changed.
         if self.replay.is_some() {
             return None;
@@ -324,15 +324,14 @@ impl Live {
         let is_dynamic = |_, body: &Body| body.kind == BodyKind::Dynamic;
         let filter = Filter::default().only(&is_dynamic);
         let hit = self.simulation.queries().ray(origin, direction, f32::INFINITY, &filter)?;
-        Some((hit.distance, hit.body.index()))
+        Some((hit.distance, hit.body))
     }
 
     /// Removes the dynamic body under the pointer.
     pub fn delete(&mut self) {
         let under = self.pointer.and_then(|pointer| self.body_at(pointer));
-        let world = &mut self.simulation.world;
-        if let Some(body) = under.and_then(|(_, i)| world.bodies.handle(i)) {
-            world.remove(body);
+        if let Some((_, body)) = under {
+            self.simulation.world.remove(body);
         }
     }
 

@@ -91,8 +91,7 @@ impl Show for Live {
         let Some((distance, body)) = self.body_at(*pointer) else { return false };
         let world = &mut self.simulation.world;
         let target = origin + distance * direction;
-        let Some(body) = world.bodies.handle(body) else { return false };
-        let pulled = &world.bodies[body.index()];
+        let Some(pulled) = world.body(body) else { return false };
         let anchor = pulled.rotation.inverse() * (target - pulled.position);
         let joint = world.insert_joint(Joint::to_world(body, anchor, target));
         self.grabbed = Some(Grabbed { body, anchor, distance, target, joint });

@@ -72,7 +72,7 @@ impl ReplayArgs {
         match difference {
             None => print("no difference from the recording: all hashes agree"),
             Some(d) => {
-                let body = d.body.map_or("a body".into(), |body| format!("body {body}"));
+                let body = d.body.map_or("a body".into(), |body| format!("body {}", body.index()));
                 print(format_args!(
                     "first difference: {body} after step {}, of {} that differ; all agree after step {}",
                     d.step, d.bodies, d.agreed

@@ -5,14 +5,12 @@ mod rows;
 
 pub use counted::SensorCount;
 
-use std::ops::Range;
-
 use serde::Serialize;
 
 use crate::hard::energy;
 use drystone::metrics::{Penetration, fastest, half_height, rms_speed};
 use drystone::stats::{HardestContact, KernelTime, median};
-use drystone::{Backend, BodyKind, Simulation, SolverConfig, StepStats, World};
+use drystone::{Backend, Body, BodyHandle, BodyKind, Simulation, SolverConfig, StepStats, World};
 use drystone_scenes::Scene;
 use glam::Vec3;
 
@@ -285,22 +283,23 @@ impl RunReport {
         self.escaped = scene.container.map(|_| scene.escaped(world));
         self.joint_gap = (!world.joints.is_empty()).then(|| world.joint_gap().into());
         // Like `drystone::metrics::in_place`, but from the stored positions.
-        let in_place = |&i: &usize| {
-            let begun = self.places.get(i);
+        let in_place = |(handle, body): &(BodyHandle, &Body)| {
+            let begun = self.places.get(handle.index());
             begun.is_some_and(|(center, half_height)| {
-                center.as_dvec3().distance(world.bodies[i].center_of_mass().as_dvec3()) < *half_height
+                center.as_dvec3().distance(body.center_of_mass().as_dvec3()) < *half_height
             })
         };
-        let standing = |group: &str, bodies: Range<usize>| {
-            let dynamic = bodies.filter(|&i| world.bodies.get(i).is_some_and(|b| b.kind == BodyKind::Dynamic));
+        let standing = |group: &str, bodies: &[BodyHandle]| {
+            let bodies = bodies.iter().filter_map(|&handle| Some((handle, world.body(handle)?)));
+            let dynamic = bodies.filter(|(_, body)| body.kind == BodyKind::Dynamic);
             Standing {
                 group: group.into(),
                 bodies: dynamic.clone().count(),
                 in_place: dynamic.filter(in_place).count(),
             }
         };
-        let all = standing("", 0..world.bodies.len()).in_place;
-        let groups = scene.groups.iter().map(|group| standing(&group.name, group.bodies.clone())).collect();
+        let all = standing("", &world.bodies.handles().collect::<Vec<_>>()).in_place;
+        let groups = scene.groups.iter().map(|group| standing(&group.name, &group.bodies)).collect();
         (self.in_place, self.standing) = (all, groups);
         self.non_finite = world.bodies.iter().filter(|b| !b.is_finite()).count();
         self.first_non_finite = world.first_non_finite().map(|body| body_name(world, body.index()));

@@ -39,7 +39,8 @@ pub fn recorded(scene: Scene, color: ColorBy, path: &Path) -> Result<Film> {
         }
         last = Some((step, time));
         let bodies = world.bodies.len();
-        let Some(body) = world.bodies.get_mut(index).filter(|b| b.kind != BodyKind::Fixed) else {
+        let body = world.bodies.handle(index).and_then(|body| world.body_mut(body));
+        let Some(body) = body.filter(|b| b.kind != BodyKind::Fixed) else {
             return Err(refuse(format!("body {index} is fixed, or not among the {bodies} bodies of the scene")));
         };
         body.rotation = Quat::from_xyzw(qx, qy, qz, qw);

@@ -5,7 +5,7 @@ use glam::{Mat3, Quat, Vec3};
 
 use drystone::StepProblem;
 use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
-use drystone::stages::problem::softness::softness;
+use drystone::stages::problem::softness;
 use drystone::stages::problem::{
     AxisRow, BodyRow, ContactRow, ConvergenceRow, DampingRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,
     MassRow, NO_LIMIT, NodeRow, Params, PointRow, Substep, TorqueRow, TurningRow,

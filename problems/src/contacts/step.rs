@@ -15,11 +15,11 @@ impl ContactProblem {
     ///
     /// ```
     /// use drystone_problems::ContactProblem;
-    /// use drystone::{Reference, Simulation, SolverConfig};
+    /// use drystone::Simulation;
     /// use drystone_scenes::Scene;
     ///
     /// let scene = Scene::find("tower", &["n=2".into()])?;
-    /// let mut simulation = Simulation::with(scene.world, SolverConfig::default(), Box::new(Reference::<f32>::new()))?;
+    /// let mut simulation = Simulation::new(scene.world)?;
     /// let (step, _) = simulation.next_problem(scene.dt)?;
     /// let problem = ContactProblem::of_step("two boxes".into(), &step);
     /// assert_eq!((problem.bodies.len(), problem.contacts.len()), (2, 8));

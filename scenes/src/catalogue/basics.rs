@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::common::{centered, floor, slope};
 use super::stacks::stack;
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Body, Shape, World};
 
 /// A ball of radius 0.5 m. Its lowest point is `height` above a half-space (m).

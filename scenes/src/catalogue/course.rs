@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::common::floor;
 use crate::driver::Driver;
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Body, Shape, World};
 
 /// Rise and tread of the stairs (m), and their number.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{Quat, Vec3};
 
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Body, Result, Shape, World};
 
 /// Distance between neighbors in the row (m).

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::common::centered;
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Body, Shape, World};
 
 /// Side of a box (m).

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::Vec3;
 
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::stages::random::SplitMix64;
 use drystone::{Body, Result, Shape, World};
 

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::common::centered;
 use crate::scene::Scene;
 use crate::spawner::{Leaves, Spawner};
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::stages::random::SplitMix64;
 use drystone::world::Collider;
 use drystone::{Body, CombineRule, Groups, Joint, Material, Result, Shape, World};

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::common::centered;
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Body, BodyHandle, Joint, Shape, World};
 
 /// A ball at the end of `length` (m), lifted by `degrees` from its hanging position. Its radius is a tenth of the

@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 
 use super::common::floor;
 use crate::scene::Scene;
-use drystone::stages::math::rotation::{about, arc, product};
+use drystone::stages::math::{about, arc, product};
 use drystone::{Axis, Body, BodyHandle, Bounds, Drive, Joint, Linear, MassProperties, Shape, World};
 
 /// A crank, a coupler and a rocker in the plane z = 0. Hinges join them to each other and to two points of the world

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::common::{centered, floor, unit_box};
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Body, Result, Shape, World};
 
 /// Initial distance between neighboring stones (m). Hulls that touch exactly have no defined contact direction.

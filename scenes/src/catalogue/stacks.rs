@@ -71,7 +71,7 @@ pub(super) fn tallest(n: usize, step: usize) -> Scene {
         let (height, z) = ((k + 1) * step, (centered(k, count) * PITCH) as f32);
         let first = world.bodies.len();
         stack(&mut world, height, 0.0, |i| ([in_turn(i, 0.01), z], 1000.0));
-        groups.push(Group { name: format!("{height} cubes"), bodies: first..world.bodies.len() });
+        groups.push(Group { name: format!("{height} cubes"), bodies: world.bodies.handles().skip(first).collect() });
     }
     Scene { groups, ..Scene::new("tallest", world, 1200).standing() }
 }

@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 
 use crate::driver::{Driver, Turn};
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Axis, Body, Joint, MassProperties, Result, Shape, World};
 
 /// Radius of a wheel (m), wheelbase (m), and the largest torque on a wheel (N m).

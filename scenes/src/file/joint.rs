@@ -8,7 +8,7 @@ use glam::{Quat, Vec3};
 use super::numbers::{checked, finite, lengths, positive, rotation, unit};
 use super::schema::{AxisFile, BodyRef, JointFile, JointKind, MotorFile, SpringFile};
 use drystone::stages::error::{ensure, input};
-use drystone::stages::math::rotation as turn;
+use drystone::stages::math as turn;
 use drystone::{Axis, BodyHandle, BodyKind, Bounds, Drive, Error, Joint, Result, World};
 
 impl fmt::Display for BodyRef {

@@ -5,11 +5,11 @@ use std::mem::offset_of;
 
 use super::parsed;
 use drystone::stages::backend::shader::{JOINT_BLOCK, JOINT_NODE, ResidentParams, SCRATCH_ROW, WrittenContact};
-use drystone::stages::problem::carry::{Preload, Written};
 use drystone::stages::problem::{
     AxisRow, BodyRow, ContactRow, ConvergenceRow, DampingRow, FreeRow, ImpulseRow, InertiaRow, JointImpulseRow,
     JointRow, MassRow, MomentumRow, Params, PassRow, PointRow, Softness, TorqueRow, TurningRow,
 };
+use drystone::stages::problem::{Preload, Written};
 
 const TYPES: &str = include_str!("../../../shaders/lib/types.wgsl");
 

@@ -180,7 +180,7 @@ mod tests {
 
     use super::*;
     use drystone::config::FrictionRule;
-    use drystone::stages::kernels::contact::solve_contact;
+    use drystone::stages::kernels::solve_contact;
     use drystone::stages::kernels::{Impulse, Pair, Point, Rules};
     use drystone::stages::math::Lane;
 

@@ -131,7 +131,7 @@ impl Outcome {
     }
 }
 
-/// Solves a problem until `e_vel` is at most `tolerance`, with at most `most` sweeps.
+/// Solves a problem until `e_vel` is at most `tolerance`, with at most `max_sweeps` sweeps.
 ///
 /// ```
 /// # use drystone_problems::contacts::{FreeBody, PointContact, Velocity};
@@ -148,7 +148,7 @@ impl Outcome {
 /// let solved = newton(&mut Bodies::new(&problem), 1e-8, 1000);
 /// assert!(solved.e_vel <= 1e-8 && (solved.impulses[0].x - 6.0).abs() < 1e-6);
 /// ```
-pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
+pub fn newton(system: &mut impl System, tolerance: f64, max_sweeps: u32) -> Outcome {
     let zero = vec![DVec3::ZERO; system.cones().len()];
     let mut best = Outcome {
         impulses: zero.clone(),
@@ -166,7 +166,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
 
     // Sweep while sweeps are expected to be cheaper.
     let mut errors = Vec::new();
-    while best.e_vel > tolerance && sweeps.count < most {
+    while best.e_vel > tolerance && sweeps.count < max_sweeps {
         (0..STRIDE).for_each(|_| sweeps.advance(system));
         best.keep(sweeps.impulses(), sweeps.error(system));
         errors.push(best.e_vel);
@@ -200,7 +200,7 @@ pub fn newton(system: &mut impl System, tolerance: f64, most: u32) -> Outcome {
     }
 
     let mut sweeps = Sweeps::new(system, Method::Accelerated, best.impulses.clone());
-    while best.e_vel > tolerance && best.e_vel.is_finite() && best.sweeps + sweeps.count < most {
+    while best.e_vel > tolerance && best.e_vel.is_finite() && best.sweeps + sweeps.count < max_sweeps {
         (0..STRIDE).for_each(|_| sweeps.advance(system));
         best.keep(sweeps.impulses(), sweeps.error(system));
     }

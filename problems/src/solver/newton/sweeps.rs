@@ -6,7 +6,7 @@ use super::cone::error;
 use super::system::{Cone, System};
 use drystone::config::Method;
 use drystone::stages::kernels::Momentum;
-use drystone::stages::kernels::momentum::StepLength;
+use drystone::stages::kernels::StepLength;
 
 /// Impulses, and the velocities that follow from them.
 #[derive(Clone)]

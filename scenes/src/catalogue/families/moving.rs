@@ -6,7 +6,7 @@ use super::Law;
 use super::draw::Draw;
 use crate::catalogue::{basics, boxes, jointed};
 use crate::scene::Scene;
-use drystone::stages::math::rotation::{about, product};
+use drystone::stages::math::{about, product};
 use drystone::{Body, Result, Shape, World};
 
 /// Shares of the friction limit: friction holds a body at the first, but not at the second.

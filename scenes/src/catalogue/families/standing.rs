@@ -6,7 +6,7 @@ use super::draw::Draw;
 use crate::catalogue::common::floor;
 use crate::catalogue::masonry;
 use crate::scene::Scene;
-use drystone::stages::math::rotation::about;
+use drystone::stages::math::about;
 use drystone::{Body, Result, Shape, World};
 
 /// Loads stay within this share of a face around its center, so that 10 % of its width is left at each edge.
