@@ -51,7 +51,7 @@ enum Page {
         /// Directory for the page. Its folder convergence gets all rows as CSV, and the pictures.
         #[arg(long, default_value = "docs")]
         out: PathBuf,
-        /// Directory with contact problems, in addition to those of catalogue scenes.
+        /// Directory with contact problems, in addition to the problems of catalogue scenes.
         #[arg(long, value_name = "DIR")]
         problems: Option<PathBuf>,
         /// Table of benches/against_siconos.py, for the section on other solvers and its profiles.
@@ -82,7 +82,7 @@ pub struct SurveyArgs {
     /// Run only this scene, as tower or tower:n=20,top_ratio=100 or a file; can be repeated.
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
-    /// Directory with contact problems, in addition to those of catalogue scenes.
+    /// Directory with contact problems, in addition to the problems of catalogue scenes.
     #[arg(long, value_name = "DIR")]
     problems: Option<PathBuf>,
     /// Number of threads of each engine.

@@ -39,10 +39,10 @@ pub(super) struct SceneArgs {
     /// Length of a step, instead of the default of the scene.
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = SCENE)]
     pub(super) dt: Option<f32>,
-    /// Preset of the settings; --set and other options change it.
+    /// Preset to start from; --set and other options override it.
     #[arg(long, value_parser = words::of::<Preset>(), conflicts_with = "config", default_value_t, help_heading = SETTINGS)]
     pub(super) preset: Preset,
-    /// Choose the substeps for this largest overlap of bodies at rest, as 1mm.
+    /// Use the fewest substeps that keep the overlap of resting bodies below this length, for example 1mm.
     ///
     /// A number without a unit is in meters. A heavy load that is applied suddenly overlaps up to twice as deep.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
@@ -65,7 +65,7 @@ pub(super) struct SceneArgs {
     /// `drystone settings` lists them.
     #[arg(long, value_name = "KEY=VALUE", help_heading = SETTINGS)]
     pub(super) set: Vec<String>,
-    /// Settings from a TOML file; --set and other options change them.
+    /// Settings from a TOML file; --set and other options override them.
     #[arg(long, value_name = "FILE", help_heading = SETTINGS)]
     pub(super) config: Option<PathBuf>,
     /// Threads on the CPU; 0 means one for each core.

@@ -29,7 +29,7 @@ impl Named for Preset {
         ("fast", "4 substeps: for games and previews"),
         ("balanced", "8 substeps"),
         ("accurate", "32 substeps"),
-        ("reference", "128 substeps: for comparison with the others"),
+        ("reference", "128 substeps: for comparison with other presets"),
     ];
 }
 
@@ -68,10 +68,10 @@ impl Named for Method {
 
 impl Named for Order {
     const WORDS: &'static [(&'static str, &'static str)] = &[
-        ("contacts", "Single contacts: in file order each takes the first color that is free on both bodies"),
+        ("contacts", "Color single contacts: each takes, in file order, the first color that is free on both bodies"),
         (
             "manifolds",
-            "Manifolds of up to four contacts with the same bodies and frame are colored; fixed bodies come last",
+            "Color manifolds: up to four contacts with the same bodies and frame; manifolds with fixed bodies come last",
         ),
     ];
 }

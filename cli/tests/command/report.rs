@@ -293,12 +293,12 @@ fn a_page_of_performance_has_the_figures_of_its_rows() {
         "| pile:n=9, 300 | drystone 8x1 | 7.77, 15.5, 23.3 | 0.411, 0.421, 0.431 | 4.44, 8.88, 13.3 | 0.411, 0.421, \
          0.431 | 0.300 |",
         "|  | other 8x1 | 7.77, 15.5, 23.3 |  | 4.44, 8.88, 13.3 |  | 2.00 |",
-        "needs 0.411 to 0.431 (one thread) and 0.411 to 0.431 (2 threads) of the fastest other engine's time, most in \
-         pile:n=9, steps 201 to 300.",
-        "at most 0.150 of the others' least",
-        "takes at most 1.70 (pile:n=9, ",
-        "; others 1.90) and the first step at most 2.90 (pile:n=9, ",
-        "; others 3.10). The first step",
+        "takes between 0.411 and 0.431 times (one thread) and between 0.411 and 0.431 times (2 threads) as long as the \
+         fastest other engine; its worst case is pile:n=9, steps 201 to 300.",
+        "at most 0.150 times the least of the other engines",
+        "takes up to 1.70 times as long (pile:n=9, ",
+        "; other engines 1.90), and the first step up to 2.90 times as long (pile:n=9, ",
+        "; other engines 3.10). The first step",
         "| 1 to 100 | 9.00 | 3.21 |",
         "| ns per manifold and pass, 1 thread | 2 threads | bytes a box |",
         "| 1000 | 20.0 (1.00) |  | 3456 |",

@@ -137,9 +137,10 @@ impl Rows {
         let names =
             names.split_last().map_or(String::new(), |(last, others)| format!("{} and {last}", others.join(", ")));
         let mut text = format!(
-            "{names} step the same scenes on one\nthread, each at its defaults. The best figures are in bold; errors below {} mm count as that. \
-             Dropped structures begin\nwith gaps of 0.5 % of a height, because structures that are built in place begin with the impulses that they \
-             rest with, in\ndrystone alone.\n\n| |{}\n|---|{}\n",
+            "{names} step the same scenes on one\nthread, each at its defaults. The best figures are in bold. \
+             Errors below {0} mm count as {0} mm.\nDropped structures start with gaps of 0.5 % of a body's height. They \
+             treat all engines alike: drystone alone starts\nstructures that are built in place with the impulses of \
+             their rest state.\n\n| |{1}\n|---|{2}\n",
             FLOOR * 1e3,
             engines.iter().map(|(_, column, _)| format!(" {column} |")).collect::<String>(),
             "--:|".repeat(engines.len())
@@ -184,8 +185,9 @@ impl Rows {
         let (_, behind, pairs) = ahead(&self.results)?;
         let _ = writeln!(
             text,
-            "\nAnother engine reaches a smaller error in {count} of {pairs} pairs of scene and error, and is ahead at equal error somewhere in \
-             {behind} of them."
+            "\nThe report compares {pairs} pairs of a scene and an error measure. In {count} pairs another engine reaches a \
+             smaller error. In {behind}\npairs some setting of another engine is faster than every setting of drystone with \
+             an error no larger, or drystone does\nnot reach its error."
         );
         Ok(text)
     }
@@ -383,7 +385,7 @@ mod tests {
         let page = "before\n<!-- rows: engines -->\nold\n<!-- end of rows -->\nafter\n";
         let text = rows.rewritten(page).expect("a page");
         assert!(text.starts_with("before\n<!-- rows: engines -->\ndrystone and [Rapier]"), "{text}");
-        assert!(text.ends_with("of them.\n<!-- end of rows -->\nafter\n"), "{text}");
+        assert!(text.ends_with("its error.\n<!-- end of rows -->\nafter\n"), "{text}");
         assert!(text.contains("| wall of 410 bricks | 1.00 ms, 2.00 mm | **0.500 ms, 1.00 mm** |\n"), "{text}");
         assert_eq!(rows.rewritten(&text).expect("a page"), text);
         for (page, message) in

@@ -30,7 +30,7 @@ fn on(threads: usize) -> String {
 /// The smallest and the largest number, as text.
 fn range(numbers: impl Iterator<Item = f64> + Clone) -> String {
     let (low, high) = (numbers.clone().fold(f64::INFINITY, f64::min), numbers.fold(0.0, f64::max));
-    format!("{} to {}", number(low), number(high))
+    format!("between {} and {}", number(low), number(high))
 }
 
 fn beside(rows: &[WindowRow]) -> String {
@@ -38,11 +38,11 @@ fn beside(rows: &[WindowRow]) -> String {
     let ratios = || own().filter_map(|r| Some((r.to_best?, r)));
     let times = distinct(own().map(|r| r.threads)).into_iter().map(|threads| {
         let of_threads = ratios().filter(move |(_, r)| r.threads == threads);
-        format!("{} ({})", range(of_threads.map(|(ratio, _)| ratio)), on(threads))
+        format!("{} times ({})", range(of_threads.map(|(ratio, _)| ratio)), on(threads))
     });
     let most = ratios().max_by(|a, b| a.0.total_cmp(&b.0));
-    let of_most =
-        most.map_or_else(String::new, |(_, r)| format!(", most in {}, steps {} to {}", r.scene, r.from, r.to));
+    let of_most = most
+        .map_or_else(String::new, |(_, r)| format!("; its worst case is {}, steps {} to {}", r.scene, r.from, r.to));
     // Relative to the smallest overlap of another engine, for each third.
     let to_least = |mine: &WindowRow| {
         let same = |r: &&WindowRow| r.engine != OWN && (&r.run, r.from) == (&mine.run, mine.from);
@@ -51,8 +51,8 @@ fn beside(rows: &[WindowRow]) -> String {
     };
     let overlap = own().filter_map(to_least).fold(0.0, f64::max);
     format!(
-        "In all thirds, {OWN} needs {} of the fastest other engine's time{of_most}. Its mean overlap is at most {} of \
-         the others' least.",
+        "In each third of a run, {OWN} takes {} as long as the fastest other engine{of_most}. Its mean overlap is at \
+         most {} times the least of the other engines.",
         times.collect::<Vec<_>>().join(" and "),
         number(overlap)
     )
@@ -63,12 +63,12 @@ fn stalls(rows: &[WindowRow]) -> String {
         let own = rows.iter().filter(|r| r.engine == OWN).map(|r| (of(r), r)).max_by(|a, b| a.0.total_cmp(&b.0));
         let others = rows.iter().filter(|r| r.engine != OWN).map(of).fold(0.0, f64::max);
         own.map_or_else(String::new, |(x, r)| {
-            format!("{} ({}, {}; others {})", number(x), r.scene, on(r.threads), number(others))
+            format!("{} times as long ({}, {}; other engines {})", number(x), r.scene, on(r.threads), number(others))
         })
     };
     format!(
-        "Relative to its third's median, the slowest later step takes at most {} and the first step at most {}. The \
-         first step computes all pairs and colors and allocates all memory.",
+        "Compared with the median of its third, the slowest step after the first takes up to {}, and the first step \
+         up to {}. The first step computes all pairs and colors, and allocates all memory.",
         most(|r| r.ms_worst / r.ms),
         most(|r| if r.from == 1 { r.ms_first / r.ms } else { 0.0 })
     )
@@ -101,8 +101,8 @@ fn growth(rows: &[GrowthRow]) -> String {
     let all_threads = distinct(rows.iter().map(|r| r.threads));
     let heads: Vec<_> = all_threads.iter().map(|&threads| thread_count(threads)).collect();
     let mut text = format!(
-        "A plane pyramid is one island. Times per manifold are the least of the stage `run` (in parentheses: relative \
-         to the smallest island). Bytes are the process's peak. Times in ms are on {} \
+        "A plane pyramid is one island. Times per manifold are the least times of the stage `run`; the ratio to the \
+         smallest island is in parentheses. Bytes are the peak of the process. Times in ms are on {} \
          ([rows](performance/growth.csv)).\n\n\
          | boxes | ns per manifold and pass, {} | bytes a box | step, ms | detection, ms | rows, ms | sweeps, ms |\n\
          |--:|{}--:|--:|--:|--:|--:|\n",
@@ -127,9 +127,10 @@ fn growth(rows: &[GrowthRow]) -> String {
 
 fn limits(rows: &[LimitRow]) -> String {
     let mut text = format!(
-        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. MiB and \
-         bytes are those of the SIMD lanes. The triad is a = b + s c over as many MiB. The peak is for multiplications \
-         and additions on registers ([rows](performance/limits.csv)).\n\n\
+        "One sweep over a point with friction between two cubes takes {OPERATIONS} counted scalar operations. MiB is \
+         the size of all SIMD lanes. Bytes count the reads and writes of a sweep. The triad is a = b + s c over arrays of \
+         that size in total. The peak is for multiplications and additions on registers \
+         ([rows](performance/limits.csv)).\n\n\
          | scene | MiB | threads | ns a manifold | bytes a manifold | of the triad, GB/s | of the peak, G/s |\n\
          |---|--:|--:|--:|--:|--:|--:|\n",
     );
@@ -179,7 +180,8 @@ fn worlds(rows: &[WorldsRow]) -> String {
 
 fn states(rows: &[StatesRow]) -> String {
     let mut text = String::from(
-        "The pile is awake and at rest. A step is in ms, other times relative to it ([rows](performance/states.csv)). \
+        "The pile is awake and at rest. A step is in ms; other times are relative to a step \
+         ([rows](performance/states.csv)). \
          `Rollback::push` copies a state into allocated memory, `Simulation::restore` returns to it, and `save` and \
          `load` convert it to and from bytes.\n\n\
          | scene | threads | step | push | restore | save | load | bytes a body |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",

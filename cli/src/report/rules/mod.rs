@@ -45,7 +45,6 @@ pub fn rules(mut after_run: impl FnMut()) -> Result<RulesReport> {
     friction::friction(&mut report, &mut after_run)?;
     substeps::heights(&mut report, &mut after_run)?;
     substeps::ratios(&mut report, &mut after_run)?;
-    report.page.push_str(include_str!("../rules_tail.md"));
     Ok(report)
 }
 

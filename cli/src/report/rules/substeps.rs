@@ -47,10 +47,9 @@ pub(super) fn heights(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> 
 pub(super) fn ratios(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> Result<()> {
     let _ = writeln!(
         report.page,
-        "\nThis table has the heaviest top (1, 2, 5, ... 10,000 times the other boxes) on a tower of 10 that stands \
-         for 20 s, and\nthe overlap of two towers:\n\n\
-         | substeps | heaviest top | overlap, 1 under 1000 | overlap, tower of 10 with 1000 times on top |\n\
-         |---|---|---|---|"
+        "\nThe second table has the heaviest top (1, 2, 5, ... 10,000 times the other boxes) on a tower of 10 that \
+         stands for 20 s,\nand the overlap of one box under another of 1000 times its mass:\n\n\
+         | substeps | heaviest top | overlap |\n|---|---|---|"
     );
     let tried = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000];
     for substeps in [4_u32, 16, 32, 64] {
@@ -68,8 +67,7 @@ pub(super) fn ratios(report: &mut RulesReport, after_run: &mut dyn FnMut()) -> R
             None => format!("{:.2} mm", s.penetration * 1e3),
             Some(time) => format!("fell at {time:.1} s"),
         };
-        let (two, ten) = (overlap(tower(2, 1000)?), overlap(tower(10, 1000)?));
-        let _ = writeln!(report.page, "| {substeps} | {heaviest} | {two} | {ten} |");
+        let _ = writeln!(report.page, "| {substeps} | {heaviest} | {} |", overlap(tower(2, 1000)?));
         after_run();
     }
     Ok(())

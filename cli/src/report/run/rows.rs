@@ -25,7 +25,7 @@ impl RunReport {
             let (colors, reused) = (self.colors, 100.0 * self.reused);
             row("contacts", format!("{manifolds} manifolds, {points} points, {colors} colors, {reused:.0} % reused"));
         } else {
-            row("contacts", format!("{manifolds} manifolds, {points} points, with those that bodies sleep on"));
+            row("contacts", format!("{manifolds} manifolds, {points} points, including those of sleeping bodies"));
             let after = |step: u32| format!("after {:.2} s", f64::from(step) * f64::from(self.dt));
             let first = self.first_asleep_step.filter(|_| self.first_asleep_step != self.all_asleep_step);
             let first = first.map_or_else(String::new, |first| format!(", the first {}", after(first)));
