@@ -416,9 +416,11 @@ impl Energy {
         list_members(&mut self.members, &self.numbers, is_free);
         for members in self.members.chunk_by(|a, b| a.0 == b.0) {
             let mut island = Island { world, problem, members, dt };
-            if self.accounts[members[0].0 as usize].is_jointed || island.is_pushed() {
+            if self.accounts[members[0].0 as usize].is_jointed {
                 island.move_with(&island.before());
                 island.follow_parabola(&self.jointed, effort);
+            } else if island.is_pushed() {
+                island.spin_with(&island.before());
             }
         }
     }

@@ -153,6 +153,21 @@ impl<'a> Island<'a> {
         self.slow_down(motions, 1.0);
     }
 
+    /// Changes all spins alike, so that the bodies get this angular momentum. Contacts without joints change linear
+    /// momentum by no more than rounding, and spins by impulses whose arms stay within the step.
+    pub fn spin_with(&mut self, momentum: &Momenta) {
+        let inertia = |i: usize| {
+            let body = &self.world.bodies[i];
+            body.mass.world_inertia(product(turn_of(&self.problem.bodies[i]), body.rotation)).as_dmat3()
+        };
+        let own: DMat3 = self.members().map(inertia).fold(DMat3::ZERO, |sum, own| sum + own);
+        let change = own.inverse() * (momentum.angular - self.now().angular);
+        for i in self.members().filter(|_| change.is_finite()) {
+            let row = &mut self.problem.bodies[i];
+            row.w = (Vec3::from(row.w).as_dvec3() + change).as_vec3().to_array();
+        }
+    }
+
     /// Moves the bodies as one to the parabola of their center. Substeps leave the places of each body ahead of its
     /// velocity by its [`lag`].
     pub fn follow_parabola(&mut self, jointed: &[bool], effort: &Effort) {
