@@ -8,8 +8,10 @@ use drystone::stages::effort::Effort;
 use drystone::stages::graph::{ConstraintGraph, Edge, IMMOVABLE};
 use drystone::stages::plan::{Kernel, Pass};
 
+use drystone::stages::plan::StepPlan;
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::{ContactRows, JointRows, begin, lay_out};
-use drystone::{Backend, BodyKind, Cpu, Reference, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::{Backend, BodyKind, Cpu, Reference, Simulation, SolverConfig};
 use drystone_scenes::Scene;
 
 /// Sweeps of a kernel in one run, so that taking the rows over hardly counts.

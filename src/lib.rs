@@ -12,7 +12,7 @@
 //! store    poses and velocities back                                          -> world              problem
 //! ```
 //!
-//! One step is a value ([`StepProblem`], plain rows) and the order of work is data ([`StepPlan`], a list of passes).
+//! One step is a value ([`StepProblem`](stages::problem::StepProblem), plain rows) and the order of work is data ([`StepPlan`](stages::plan::StepPlan), a list of passes).
 //! Every shader function has a Rust twin of the same name ([`stages::kernels`]), so a test can compare every number
 //! that the GPU computes.
 //!
@@ -85,8 +85,6 @@ pub use character::Character;
 pub use config::SolverConfig;
 pub use error::{Error, Result};
 pub use glam;
-pub use plan::StepPlan;
-pub use problem::StepProblem;
 pub use simulation::{
     ColliderOf, Contact, ContactHooks, ContactPoint, Event, Hit, Listen, PendingContact, PendingPoint, Rollback,
     Simulation, Snapshot, SolvedManifold, SolvedPoint, Summed,

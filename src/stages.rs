@@ -27,13 +27,13 @@ pub mod problem {
     pub use crate::problem::{
         AxisRow, BodyRow, ContactRow, ContactRows, ContactSummary, ConvergenceRow, DampingRow, FreeRow, ImpulseRow,
         InertiaRow, JointImpulseRow, JointRow, JointRows, JointSystems, MassRow, MomentumRow, NO_LIMIT, NodeRow,
-        Params, PassRow, PointRow, Softness, Substep, TorqueRow, TurningRow, begin, lay_out,
+        Params, PassRow, PointRow, Softness, StepProblem, Substep, TorqueRow, TurningRow, begin, lay_out,
     };
 }
 
 /// The order of work as data: a list of passes.
 pub mod plan {
-    pub use crate::plan::{Kernel, Pass};
+    pub use crate::plan::{Kernel, Pass, StepPlan};
 }
 
 /// The effect of a pass on its rows. Every function of a shader has a twin of the same name here.

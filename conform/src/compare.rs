@@ -29,8 +29,10 @@
 //! ```
 
 use drystone::stages::plan::Pass;
+use drystone::stages::plan::StepPlan;
 use drystone::stages::problem::JointSystems;
-use drystone::{Backend, Body, BodyHandle, Error, Result, Simulation, SolverConfig, StepPlan, StepProblem, World};
+use drystone::stages::problem::StepProblem;
+use drystone::{Backend, Body, BodyHandle, Error, Result, Simulation, SolverConfig, World};
 use drystone_scenes::{Scene, Spawners};
 
 /// The difference between two worlds.

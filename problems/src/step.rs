@@ -1,8 +1,10 @@
 //! Steps of a simulation with their contact problems and residuals.
 
+use drystone::stages::plan::StepPlan;
 use drystone::stages::plan::{Kernel, Pass};
 use drystone::stages::problem::ContactRow;
-use drystone::{Backend, Body, Error, Reference, Result, Simulation, StepPlan, StepProblem, StepStats};
+use drystone::stages::problem::StepProblem;
+use drystone::{Backend, Body, Error, Reference, Result, Simulation, StepStats};
 
 use crate::contacts::ContactProblem;
 use crate::residuals::Residuals;

@@ -176,7 +176,7 @@ crate::saved::fields!(SolverConfig {
 });
 
 /// Default of [`SolverConfig::fuse_colors_below`].
-pub const FUSE_BELOW: u32 = 256;
+pub(crate) const FUSE_BELOW: u32 = 256;
 
 /// Shortest step (s). In a shorter step, no motion can be distinguished from rest in single precision.
 pub const SHORTEST_STEP: f32 = 1e-9;

@@ -52,7 +52,8 @@ struct Sweeps<'a> {
 /// The passes of one step.
 ///
 /// ```
-/// use drystone::{Simulation, StepPlan};
+/// use drystone::Simulation;
+/// use drystone::stages::plan::StepPlan;
 /// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &["n=3".into()])?;

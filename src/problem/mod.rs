@@ -52,7 +52,8 @@ use glam::Vec3;
 /// `joint_totals`, `convergence` and `momentum`.
 ///
 /// ```
-/// use drystone::{Simulation, StepProblem};
+/// use drystone::Simulation;
+/// use drystone::stages::problem::StepProblem;
 /// use drystone_scenes::Scene;
 ///
 /// let scene = Scene::find("tower", &["n=3".into()])?;

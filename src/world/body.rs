@@ -901,13 +901,7 @@ impl Body {
     }
 
     /// Whether the body is dynamic and rotation about a world axis is locked.
-    ///
-    /// ```
-    /// use drystone::Body;
-    ///
-    /// assert!(Body::dynamic().locked_rotations([true, false, false]).has_locked_rotation());
-    /// ```
-    pub fn has_locked_rotation(&self) -> bool {
+    pub(crate) fn has_locked_rotation(&self) -> bool {
         self.kind == BodyKind::Dynamic && self.locked_rotations != [false; 3]
     }
 

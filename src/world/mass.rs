@@ -52,9 +52,9 @@ impl MassProperties {
     /// precision.
     pub const MASSES: RangeInclusive<f32> = 1e-15..=1e15;
     /// Range of moments of inertia that can be simulated (kg m²).
-    pub const MOMENTS: RangeInclusive<f32> = 1e-30..=1e30;
+    pub(crate) const MOMENTS: RangeInclusive<f32> = 1e-30..=1e30;
     /// Largest ratio of two moments of a body. For a rod the ratio is (length / radius)² / 6.
-    pub const MAX_RATIO: f32 = 1e12;
+    pub(crate) const MAX_RATIO: f32 = 1e12;
 
     /// Largest ratio of m r² to a moment of inertia that a simulation accepts, where r is the lever of the shapes about
     /// that axis. The ratio is 3 for boxes, 2.5 for balls and at most 15 for cones. From about 100 on, sweeps that

@@ -2,9 +2,11 @@
 
 use crate::common::settings::set;
 use drystone::stages::backend::CheckedStep;
+use drystone::stages::plan::StepPlan;
 use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::{AxisRow, DampingRow, InertiaRow, JointImpulseRow, TorqueRow};
-use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::{Backend, Cpu, Reference, Simulation, SolverConfig};
 use drystone_scenes::Scene;
 
 /// The problem of a step with contacts, joints and spins, and its plan.

@@ -2,8 +2,10 @@
 
 use crate::common::state::reference;
 use drystone::stages::backend::CheckedStep;
+use drystone::stages::plan::StepPlan;
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::{JointImpulseRow, JointRow};
-use drystone::{Backend, Reference, Result, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::{Backend, Reference, Result, Simulation, SolverConfig};
 use drystone_conform::compare::{BodyDifference, Difference, FirstDifference, Stage, compare, first_difference};
 use drystone_scenes::Scene;
 

@@ -150,7 +150,7 @@ fn arms(r_a: [f32; 3], r_b: [f32; 3]) -> [u32; 6] {
 }
 
 /// Separation of the surfaces, preload and normal impulse of each point of every row.
-fn rows(problem: &drystone::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
+fn rows(problem: &drystone::stages::problem::StepProblem) -> HashMap<Contact, Vec<[f32; 3]>> {
     let of = |row: &drystone::stages::problem::ContactRow| {
         let own = row.first_point as usize..(row.first_point + row.point_count) as usize;
         let points = &problem.points[own.clone()];

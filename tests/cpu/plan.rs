@@ -1,8 +1,9 @@
 //! Plans: what a scene lacks is absent from its plan, and saves what it would have moved.
 
 use drystone::stages::plan::Kernel;
+use drystone::stages::plan::StepPlan;
 use drystone::stages::problem::ContactSummary;
-use drystone::{Backend, Body, Joint, Reference, Shape, Simulation, SolverConfig, StepPlan, World};
+use drystone::{Backend, Body, Joint, Reference, Shape, Simulation, SolverConfig, World};
 use drystone_scenes::Scene;
 use glam::Vec3;
 

@@ -509,7 +509,7 @@ fn the_first_solve_leaves_no_velocity_along_locks() {
         of_kind(|k| matches!(k, Kernel::MeasureJoints(_))),
         of_kind(|k| matches!(k, Kernel::IntegratePositions { .. })),
     ];
-    let lacking = |passes: usize, problem: &mut drystone::StepProblem| {
+    let lacking = |passes: usize, problem: &mut drystone::stages::problem::StepProblem| {
         Reference::<f64>::new().run(problem, &plan.passes[..passes]).expect("it runs");
         let mut most = 0.0_f32;
         for joint in &problem.joints {
@@ -547,7 +547,7 @@ fn the_first_solve_leaves_no_velocity_between_anchors() {
         let (mut problem, plan) = simulation.next_problem(DT).expect("a step");
         let end =
             plan.passes.iter().position(|p| matches!(p.kernel, Kernel::IntegratePositions { .. })).expect("a substep");
-        let lacking = |passes: usize, problem: &mut drystone::StepProblem| {
+        let lacking = |passes: usize, problem: &mut drystone::stages::problem::StepProblem| {
             Reference::<f64>::new().run(problem, &plan.passes[..passes]).expect("it runs");
             let bodies = &problem.bodies;
             let velocity = |body: u32, r: [f32; 3]| {

@@ -4,7 +4,8 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
-use drystone::{Axis, Body, Joint, Linear, Reference, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::stages::problem::StepProblem;
+use drystone::{Axis, Body, Joint, Linear, Reference, Shape, Simulation, SolverConfig, World};
 
 use crate::common::Open;
 use crate::common::state::{joint_angular_impulses, reference};

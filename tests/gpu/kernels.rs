@@ -16,7 +16,8 @@ use drystone::config::FrictionRule;
 use drystone::stages::kernels::Rules;
 use drystone::stages::plan::{Kernel, Pass};
 use drystone::stages::problem::ConvergenceRow;
-use drystone::{Backend, Reference, StepProblem};
+use drystone::stages::problem::StepProblem;
+use drystone::{Backend, Reference};
 
 tests! {
     any_gpu {

@@ -6,10 +6,11 @@ use drystone::config::FrictionAt;
 use drystone::glam::{Quat, Vec3};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::backend::shader::WrittenContact;
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::{Carry, Written};
 use drystone::stages::problem::{ContactRow, ConvergenceRow, MomentumRow};
 use drystone::stats::Traffic;
-use drystone::{Backend, Body, Gpu, Reference, Result, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::{Backend, Body, Gpu, Reference, Result, Shape, Simulation, SolverConfig, World};
 use drystone_conform::compare::Difference;
 use drystone_scenes::Scene;
 

@@ -11,10 +11,11 @@ use crate::compare::BodyDifference;
 use drystone::backend::gpu::{Gpu, GpuOptions, Loss};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::{BodyRow, MassRow, Substep};
 use drystone::stages::random::SplitMix64;
 use drystone::stats::median;
-use drystone::{Backend, Body, BodyKind, Cpu, Error, Reference, Result, StepProblem};
+use drystone::{Backend, Body, BodyKind, Cpu, Error, Reference, Result};
 
 /// The longest time that a submission may hold a device. Watchdogs end work after two seconds or more.
 const LONGEST: Duration = Duration::from_millis(500);

@@ -1,7 +1,7 @@
 //! Differences between the rows that two backends return for one problem.
 
-use drystone::StepProblem;
 use drystone::stages::problem::BodyRow;
+use drystone::stages::problem::StepProblem;
 
 /// All numbers that a backend returns.
 fn numbers(problem: &StepProblem) -> Vec<f32> {

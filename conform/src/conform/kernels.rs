@@ -5,7 +5,8 @@ use super::passes::{every_kernel, has_patches, ways_to_run};
 use super::{Group, Outcome, PLAIN_PASS, Run, failed, random};
 use drystone::stages::backend::CheckedStep;
 use drystone::stages::plan::{Kernel, Pass};
-use drystone::{Backend, Reference, StepProblem};
+use drystone::stages::problem::StepProblem;
+use drystone::{Backend, Reference};
 
 /// Variants of a kernel in a short run.
 const FEW: usize = 3;

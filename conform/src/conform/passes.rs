@@ -3,10 +3,10 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use drystone::StepProblem;
 use drystone::config::FrictionRule;
 use drystone::stages::kernels::Rules;
 use drystone::stages::plan::{Kernel, Pass};
+use drystone::stages::problem::StepProblem;
 
 /// Every combination of rules that makes a difference.
 pub fn every_rules() -> Vec<Rules> {

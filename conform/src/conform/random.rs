@@ -3,8 +3,8 @@
 
 use glam::{Mat3, Quat, Vec3};
 
-use drystone::StepProblem;
 use drystone::stages::graph::{Coloring, ConstraintGraph, Edge, IMMOVABLE};
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::softness;
 use drystone::stages::problem::{
     AxisRow, BodyRow, ContactRow, ConvergenceRow, DampingRow, ImpulseRow, InertiaRow, JointImpulseRow, JointRow,

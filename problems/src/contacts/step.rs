@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::operator::inverse;
 use super::{ContactProblem, FreeBody, PointContact, Velocity};
-use drystone::StepProblem;
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::{BodyRow, ContactRow, MassRow};
 
 impl ContactProblem {

@@ -4,11 +4,12 @@ use glam::{DMat3, DVec3};
 
 use super::{Order, Sequence};
 use crate::contacts::{ContactProblem, Operator, PointContact, Velocity};
+use drystone::Result;
 use drystone::stages::error::input;
 use drystone::stages::kernels::{Body, Contact, Impulse, KernelRows, Mass, Point, StepParams, Sym3};
 use drystone::stages::math::{Vec3, vec3};
+use drystone::stages::problem::StepProblem;
 use drystone::stages::problem::{BodyRow, ContactRow, ImpulseRow, Params, Softness, Substep, tangent_mass};
-use drystone::{Result, StepProblem};
 
 /// A contact problem as a step without duration.
 pub(super) struct Assembled {

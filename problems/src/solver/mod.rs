@@ -26,7 +26,9 @@ use assemble::Assembled;
 use drystone::config::Method;
 use drystone::stages::kernels::{Body, Impulse};
 use drystone::stages::math::Vec3;
-use drystone::{Backend, Reference, Result, StepPlan, StepProblem};
+use drystone::stages::plan::StepPlan;
+use drystone::stages::problem::StepProblem;
+use drystone::{Backend, Reference, Result};
 
 /// Number of plain sweeps between two corrections of the velocities.
 const DRIFT_SWEEPS: u32 = 64;

@@ -1,7 +1,8 @@
 //! The length of a step: impulses and preloads follow it, and so does the plan.
 
 use drystone::glam::Vec3;
-use drystone::{Body, Joint, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::stages::problem::StepProblem;
+use drystone::{Body, Joint, Shape, Simulation, SolverConfig, World};
 use drystone_conform::compare::Difference;
 use drystone_scenes::Scene;
 
@@ -92,7 +93,7 @@ fn a_plan_is_always_that_of_its_problem() {
             continue;
         }
         steps += 1;
-        let fresh = drystone::StepPlan::new(&config, &simulation.problem().clone());
+        let fresh = drystone::stages::plan::StepPlan::new(&config, &simulation.problem().clone());
         assert_eq!(simulation.plan(), &fresh, "step {step}");
         if plans.last() != Some(&fresh) {
             plans.push(fresh);
@@ -109,7 +110,7 @@ fn assert_planned_anew(simulation: &mut Simulation, colors: &[u32]) {
     let problem = simulation.problem().clone();
     let bodies = problem.blocks[0].bodies as usize;
     assert_eq!(problem.colors[..=bodies], colors[..=bodies], "other colors ask for another plan anyway");
-    assert_eq!(simulation.plan(), &drystone::StepPlan::new(&config, &problem));
+    assert_eq!(simulation.plan(), &drystone::stages::plan::StepPlan::new(&config, &problem));
 }
 
 #[test]
@@ -186,7 +187,7 @@ fn a_plan_belongs_to_a_length_of_step() {
         one.step(dt).expect("a step");
         let (problem, _) = other.next_problem(dt).expect("a step");
         other.step(dt).expect("a step");
-        let fresh = drystone::StepPlan::new(other.config(), &problem);
+        let fresh = drystone::stages::plan::StepPlan::new(other.config(), &problem);
         assert_eq!(other.plan(), &fresh, "step {step}, {dt} s");
         assert_eq!(Difference::between(&one.world, &other.world).bodies, 0, "step {step}, {dt} s");
     }

@@ -2,8 +2,9 @@
 
 use drystone::config::{Friction, FrictionAt};
 use drystone::stages::problem::ContactRow;
+use drystone::stages::problem::StepProblem;
 use drystone::world::Collider;
-use drystone::{Body, CombineRule, Material, Shape, Simulation, SolverConfig, StepProblem, World};
+use drystone::{Body, CombineRule, Material, Shape, Simulation, SolverConfig, World};
 use glam::{Quat, Vec3};
 
 use super::{DT, G, bounced, cube, floor, near, on_a_slope, on_a_slope_that_falls, run, simulation};

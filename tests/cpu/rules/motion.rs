@@ -3,7 +3,8 @@
 use std::f32::consts::PI;
 
 use drystone::config::JointSolver;
-use drystone::{Body, Joint, Shape, SolverConfig, StepProblem, World};
+use drystone::stages::problem::StepProblem;
+use drystone::{Body, Joint, Shape, SolverConfig, World};
 use glam::{Quat, Vec3};
 
 use super::{DT, ball, bounced, empty, floor, near, run, simulation};

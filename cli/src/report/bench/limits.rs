@@ -5,7 +5,9 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use drystone::stages::plan::Kernel;
-use drystone::{Backend, Cpu, Result, Simulation, SolverConfig, StepPlan, StepProblem};
+use drystone::stages::plan::StepPlan;
+use drystone::stages::problem::StepProblem;
+use drystone::{Backend, Cpu, Result, Simulation, SolverConfig};
 use drystone_scenes::Scene;
 
 use super::rates::{peak, triad};
