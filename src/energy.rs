@@ -68,7 +68,7 @@ struct DriveSprings {
     /// At the end of the step before; infinite if it is not known.
     energy: f32,
     /// The part that came from no motion: an angle jumped from half a turn to the other side, or constraints strained a
-    /// spring by more than the motion had.
+    /// spring by more than the motion had. Infinite if fixed geometry stopped a body after the step.
     unearned: f32,
 }
 
@@ -78,8 +78,13 @@ impl DriveSprings {
     /// The energy that springs give back in a step in which they hold `before` and `after`. They give back at most what
     /// they took.
     fn give_back(&mut self, [before, after]: [f64; 2]) -> f64 {
-        self.unearned = self.unearned.min(self.energy);
         let jump = before - f64::from(self.energy);
+        if self.unearned.is_infinite() {
+            // The stop undid a motion that has its energy.
+            *self = Self { energy: after as f32, unearned: 0.0 };
+            return before - after - jump.max(0.0);
+        }
+        self.unearned = self.unearned.min(self.energy);
         if jump > MIN_JUMP * before {
             self.unearned += jump as f32;
         }
@@ -277,6 +282,22 @@ impl Energy {
     /// Updates the joints of a body that are new or changed.
     pub fn follow_joints_of(&mut self, body: usize) {
         self.fresh.push(body);
+    }
+
+    /// Notes the bodies that fixed geometry stopped after the step that `problem` has run. Their joints were measured
+    /// before.
+    pub fn follow_stops(&mut self, problem: &StepProblem, stopped: &[usize]) {
+        stopped.iter().for_each(|&i| self.reserves[i] = 0.0);
+        for &row in problem.rows_of(&problem.joint_colors()) {
+            let ends = ends(&problem.joints[row as usize]).map(|end| end as usize);
+            if ends.iter().any(|end| stopped.contains(end)) {
+                for end in ends {
+                    if let Some(springs) = self.drive_springs.get_mut(end) {
+                        springs.unearned = f32::INFINITY;
+                    }
+                }
+            }
+        }
     }
 
     /// Notes which bodies joints hold in the step that `problem` has run, and returns it.

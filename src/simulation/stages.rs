@@ -511,8 +511,9 @@ impl Stages {
         let taken = energy.hold(world, problem, effort, &key.config, dt, |i| detector.is_teleported(world, i));
         problem::store(&self.problem, self.sleep.asleep(), world);
         let (far, stopped) = self.detector.hold(world, dt, self.sleep.activity());
-        // The joints are measured within the step. They do not hold the energy of their springs at its end.
-        self.energy.follow_bodies(world, &stopped);
+        if !stopped.is_empty() {
+            self.energy.follow_stops(&self.problem, &stopped);
+        }
         self.detector.note_left(world);
         self.astray = bodies_astray(world);
         if self.detector.has_sensors() || !self.events.inside().is_empty() {
