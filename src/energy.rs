@@ -663,3 +663,18 @@ fn weight(mass: &MassRow) -> f64 {
 fn turn_of(row: &BodyRow) -> Quat {
     unit(Quat::from_array(row.dq))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A spring of 10 J releases 2 J. A wall strains it again, and the next step releases the same 2 J.
+    #[test]
+    fn a_spring_that_a_stop_strained_gives_nothing_for_that() {
+        let mut springs = DriveSprings { energy: 10.0, unearned: 0.0 };
+        assert_eq!(springs.give_back([10.0, 8.0]), 2.0);
+        springs.unearned = f32::INFINITY;
+        assert_eq!(springs.give_back([10.0, 8.0]), 0.0);
+        assert_eq!(springs.give_back([8.0, 7.0]), 1.0);
+    }
+}

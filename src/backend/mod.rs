@@ -40,7 +40,7 @@ pub type Running<'a, T = Result<()>> = Pin<Box<dyn Future<Output = T> + Send + '
 /// assert_eq!((backend.traffic().up, backend.kernel_times().len()), (0, 0));
 ///
 /// // The same for a web page: other tasks continue meanwhile.
-/// use drystone::stages::{backend::CheckedStep, problem::carry::Carry};
+/// use drystone::stages::{backend::CheckedStep, problem::Carry};
 /// let mut repeated = problem.clone();
 /// pollster::block_on(backend.run_async(CheckedStep::new(&mut repeated, &plan.passes)?))?;
 /// pollster::block_on(backend.step_async(CheckedStep::new(&mut problem, &plan.passes)?, &Carry::default()))?;

@@ -43,7 +43,7 @@ impl Carry {
 pub struct Written {
     /// Its row.
     pub row: u32,
-    /// For each point, the index that it had in the row before, or [`NO_POINT`] for a new point; [`Written::NEW`] if
+    /// For each point, the index that it had in the row before, or `NO_POINT` for a new point; [`Written::NEW`] if
     /// the row begins without impulses.
     pub points_before: [u8; 4],
 }

@@ -247,7 +247,7 @@ pub struct JointRow {
     pub is_loose: f32,
     /// Index of its first axis in `axes`.
     pub first_axis: u32,
-    /// Number of its axes, up to [`MAX_AXES`].
+    /// Number of its axes, up to `MAX_AXES`.
     pub axis_count: u32,
     #[doc(hidden)]
     pub pad: [u32; 2],
@@ -302,7 +302,7 @@ impl AxisRow {
     /// turn against each other in the step.
     pub const TURN: f32 = 0.0;
 
-    /// One of the coordinates of a rotation, by its number in [`Angles`](crate::math::angles::Angles).
+    /// One of the coordinates of a rotation, by its number in `Angles`.
     pub fn angle(number: usize) -> f32 {
         -1.0 - number as f32
     }
@@ -374,7 +374,7 @@ pub struct ImpulseRow {
 
 crate::saved::fields!(ImpulseRow { normal, tangent_1, tangent_2, bounce });
 
-/// Coefficients of a soft contact over one substep, 16 B. Derivation: [`super::softness`].
+/// Coefficients of a soft contact over one substep, 16 B. Derivation: `problem::softness`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Softness {

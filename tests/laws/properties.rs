@@ -184,11 +184,19 @@ fn worlds_beyond_the_precision_of_a_step_gain_nothing() {
     });
 }
 
+/// A wall stopped a body after each step, and strained again the springs that the step had released: a gain of 42 %.
+#[test]
+fn stops_by_fixed_geometry_give_springs_no_energy() {
+    each_for_ten_seconds(&[(Family::Springs, Kind::Ball, true, 15)], |drawn, verdict| {
+        assert!(verdict.lasting_gain() < MAX_LASTING, "{drawn} gains {:.1e}", verdict.lasting_gain());
+    });
+}
+
 /// Joints, contacts, motors, springs and limits change no momentum. Without the law one world of four changed its angular
 /// momentum by more than 1e-4 in 10 s.
 #[test]
 fn what_nothing_touches_keeps_its_momentum() {
-    let group = |families| Group { is_alone: true, one_in: 3, ..Group::new(families, JOINTED) };
+    let group = |families| Group { is_alone: true, one_in: 3, ..Group::new(families, EVERY) };
     let laws = &["momentum", "spin"];
     Group { one_in: 1, ..group(&Family::ALL) }.keeps(laws);
     group(&[Family::Plain]).preset(Preset::Fast).keeps(laws);
@@ -267,7 +275,6 @@ broken! {
     energy_with_accurate: "4 of 192 worlds gain energy", Group::new(&[Family::Plain], EVERY).preset(Preset::Accurate), ["finite", "energy"];
     energy_at_30_steps: "10 of 192 worlds gain energy", Group { rate: 30, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
     energy_at_240_steps: "6 of 192 worlds gain energy", Group { rate: 240, ..Group::new(&[Family::Plain], EVERY) }, ["finite", "energy"];
-    angular_momentum_of_contacts: "2 of 24 worlds change their angular momentum", Group::new(&[Family::Plain], &[Kind::None]), ["spin"];
     gaps: "15 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Plain], JOINTED), ["gap"];
     gaps_of_light_and_heavy_bodies: "20 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Ratios], JOINTED), ["gap"];
     gaps_on_long_levers: "18 of 168 worlds open their joints by more than 1 %", Group::new(&[Family::Levers], JOINTED), ["gap"];

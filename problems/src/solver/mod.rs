@@ -3,7 +3,7 @@
 //!
 //! A sweep visits one manifold after another. It corrects the normal impulses, then friction, and clamps both to
 //! Coulomb's cone (docs/derivation.md, sections 4 and 6). The accelerated method adds momentum
-//! ([`drystone::stages::kernels::momentum`]).
+//! (`extrapolate` in the kernels of the engine).
 //!
 //! Sweeps update velocities together with impulses, and rounding makes the two drift apart: in f32 by about 3e-8 of the
 //! free velocities per sweep, and by more with momentum. So velocities are recomputed from the impulses in f64 after
