@@ -102,17 +102,11 @@ pub const EFFORT_CLASSES: usize = 13;
 #[non_exhaustive]
 pub struct HardestContact {
     /// Its dynamic bodies; only one if the other body is not dynamic. serde writes their indices.
-    #[cfg_attr(feature = "serde", serde(serialize_with = "as_indices"))]
     pub bodies: [Option<BodyHandle>; 2],
     /// Static compression of the contact under its sustained load with the substeps of the settings, divided by the
     /// compression that the settings promise. An island with need n takes at least the square root of n times these
     /// substeps.
     pub need: f32,
-}
-
-#[cfg(feature = "serde")]
-fn as_indices<S: serde::Serializer>(bodies: &[Option<BodyHandle>; 2], serializer: S) -> Result<S::Ok, S::Error> {
-    serde::Serialize::serialize(&bodies.map(|body| body.map(BodyHandle::index)), serializer)
 }
 
 /// Time of a device at one kernel in one step.

@@ -110,7 +110,6 @@ const QUANTITIES: [&str; 13] = [
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct BodyDifference {
     /// The body in each world. Written as their indices.
-    #[cfg_attr(feature = "serde", serde(serialize_with = "as_indices"))]
     pub bodies: [Option<BodyHandle>; 2],
     /// The name of the number, for example `position.x`. It is `presence` if the body is in only one world, or if
     /// another body has its index.
@@ -119,15 +118,12 @@ pub struct BodyDifference {
     pub values: [f32; 2],
 }
 
-#[cfg(feature = "serde")]
-fn as_indices<S: serde::Serializer>(
-    bodies: &[Option<BodyHandle>; 2],
-    serializer: S,
-) -> std::result::Result<S::Ok, S::Error> {
-    serde::Serialize::serialize(&bodies.map(|body| body.map(BodyHandle::index)), serializer)
-}
-
 impl BodyDifference {
+    /// The index of the body, in the world that has it.
+    pub fn index(&self) -> usize {
+        self.bodies[0].or(self.bodies[1]).map_or(0, BodyHandle::index)
+    }
+
     /// The first number of the first body that differs in any bit.
     pub fn first(a: &World, b: &World) -> Option<Self> {
         let all = 0..a.bodies.len().max(b.bodies.len());
@@ -147,8 +143,7 @@ impl BodyDifference {
 impl std::fmt::Display for BodyDifference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [x, y] = self.values;
-        let body = self.bodies[0].or(self.bodies[1]).map_or(0, BodyHandle::index);
-        write!(f, "body {body}, {}: {x:?} and {y:?}", self.quantity)
+        write!(f, "body {}, {}: {x:?} and {y:?}", self.index(), self.quantity)
     }
 }
 

@@ -267,15 +267,9 @@ pub struct ReplayDifference {
     /// The last earlier step after which the hashes agreed; 0 for the beginning.
     pub agreed: u32,
     /// The first body that differs, or `None` if the short hashes of the bodies all agree. Written as its index.
-    #[cfg_attr(feature = "serde", serde(serialize_with = "as_index"))]
     pub body: Option<BodyHandle>,
     /// Lower bound on the number of bodies that differ.
     pub bodies: usize,
-}
-
-#[cfg(feature = "serde")]
-fn as_index<S: serde::Serializer>(body: &Option<BodyHandle>, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-    serde::Serialize::serialize(&body.map(BodyHandle::index), serializer)
 }
 
 /// A whole state of a recording.

@@ -92,14 +92,8 @@ fn order(contact: &Contact) -> impl Ord + use<> {
 /// }
 /// batch.step(1, &[0, 1])?;
 /// let events = batch.events(&[0, 1])?;
-/// let body = |i: usize| batch.world(i / 2).simulation().world.bodies.handle(i % 2);
-/// let began = |world| EventRow {
-///     world,
-///     kind: "began",
-///     bodies: [body(2 * world as usize), body(2 * world as usize + 1)],
-///     joint: None,
-///     value: 0.0,
-/// };
+/// let bodies = |world| [0, 1].map(|i| batch.world(world).simulation().world.bodies.handle(i));
+/// let began = |world| EventRow { world, kind: "began", bodies: bodies(world as usize), joint: None, value: 0.0 };
 /// assert_eq!(events, [began(0), began(1)]);
 /// # Ok::<(), drystone::Error>(())
 /// ```

@@ -21,7 +21,8 @@ struct RigidMotion {
     turning: f64,
 }
 
-/// The mass of some bodies, their center of mass, momentum, angular momentum about the center, and inertia about it.
+/// The mass of some bodies, their center of mass, momentum, angular momentum about the center, inertia about it, and the
+/// sum of their inertias, each about its own center.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Momenta {
     mass: f64,
@@ -29,13 +30,14 @@ pub(super) struct Momenta {
     linear: DVec3,
     angular: DVec3,
     inertia: DMat3,
+    own: DMat3,
 }
 
 impl Momenta {
     /// Sums over bodies. Each has its center of mass, its velocities, and its rotation in the step.
     fn of(world: &World, bodies: impl Iterator<Item = (usize, DVec3, [DVec3; 2], Quat)> + Clone) -> Self {
         let [center, linear, angular] = [DVec3::ZERO; 3];
-        let mut all = Self { mass: 0.0, center, linear, angular, inertia: DMat3::ZERO };
+        let mut all = Self { mass: 0.0, center, linear, angular, inertia: DMat3::ZERO, own: DMat3::ZERO };
         for (i, place, [v, _], _) in bodies.clone() {
             let m = f64::from(world.bodies[i].mass.mass);
             all.mass += m;
@@ -50,6 +52,7 @@ impl Momenta {
             let own = body.mass.world_inertia(product(turn, body.rotation)).as_dmat3();
             all.angular += m * r.cross(v) + own * w;
             let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
+            all.own += own;
             all.inertia += own + (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * m;
         }
         all
@@ -102,24 +105,18 @@ impl<'a> Island<'a> {
     /// path.
     pub fn before(&self) -> Momenta {
         let halfway = |i: usize| 0.5 * Vec3::from(self.problem.bodies[i].dp).as_dvec3();
-        let decays = |i: usize| {
-            let body = &self.world.bodies[i];
-            [body.linear_damping, body.angular_damping].map(|rate| Decay::of(rate, self.dt))
-        };
-        let gained = |i: usize| Vec3::from(self.problem.masses[i].acceleration).as_dvec3() * decays(i)[0].gain;
+        let spin_decay = |i: usize| Decay::of(self.world.bodies[i].angular_damping, self.dt);
         let body = |i: usize| {
             let body = &self.world.bodies[i];
-            let [place, v, w] =
-                [body.center_of_mass(), body.linear_velocity, body.angular_velocity].map(|u| u.as_dvec3());
-            let [kept_v, kept_w] = decays(i).map(|decay| 1.0 - decay.loss);
-            (i, place, [v * kept_v + gained(i), w * kept_w], Quat::IDENTITY)
+            let [place, w] = [body.center_of_mass(), body.angular_velocity].map(|u| u.as_dvec3());
+            (i, place, [self.untouched(i)[0], w * (1.0 - spin_decay(i).loss)], Quat::IDENTITY)
         };
         let mut all = Momenta::of(self.world, self.members().map(body));
         let mass = |i: usize| f64::from(self.world.bodies[i].mass.mass);
         let center = self.members().map(|i| mass(i) * halfway(i)).sum::<DVec3>() / all.mass;
         for i in self.members() {
-            let torque = self.world.bodies[i].whole_torque().as_dvec3() * decays(i)[1].gain;
-            all.angular += torque + mass(i) * (halfway(i) - center).cross(gained(i));
+            let torque = self.world.bodies[i].whole_torque().as_dvec3() * spin_decay(i).gain;
+            all.angular += torque + mass(i) * (halfway(i) - center).cross(self.untouched(i)[1]);
         }
         all
     }
@@ -127,12 +124,17 @@ impl<'a> Island<'a> {
     /// Whether contacts changed the velocity of any of its bodies.
     pub fn is_pushed(&self) -> bool {
         self.members().any(|i| {
-            let (body, v) = (&self.world.bodies[i], Vec3::from(self.problem.bodies[i].v));
-            let decay = Decay::of(body.linear_damping, self.dt);
-            let gained = Vec3::from(self.problem.masses[i].acceleration) * decay.gain as f32;
-            let free = body.linear_velocity * (1.0 - decay.loss) as f32 + gained;
-            v.distance(free) > MAX_ROUNDINGS as f32 * f32::EPSILON * (free.length() + gained.length())
+            let [free, gained] = self.untouched(i);
+            let changed = Vec3::from(self.problem.bodies[i].v).as_dvec3().distance(free);
+            changed > MAX_ROUNDINGS * f64::from(f32::EPSILON) * (free.length() + gained.length())
         })
+    }
+
+    /// The velocity that a body would have after the step without constraints, and the part of it that forces gave.
+    fn untouched(&self, i: usize) -> [DVec3; 2] {
+        let decay = Decay::of(self.world.bodies[i].linear_damping, self.dt);
+        let gained = Vec3::from(self.problem.masses[i].acceleration).as_dvec3() * decay.gain;
+        [self.world.bodies[i].linear_velocity.as_dvec3() * (1.0 - decay.loss) + gained, gained]
     }
 
     /// Whether no body moved further in the step than the sum of three parts: twice the distance that the fastest of
@@ -156,12 +158,8 @@ impl<'a> Island<'a> {
     /// Changes all spins alike, so that the bodies get this angular momentum. Contacts without joints change linear
     /// momentum by no more than rounding, and spins by impulses whose arms stay within the step.
     pub fn spin_with(&mut self, momentum: &Momenta) {
-        let inertia = |i: usize| {
-            let body = &self.world.bodies[i];
-            body.mass.world_inertia(product(turn_of(&self.problem.bodies[i]), body.rotation)).as_dmat3()
-        };
-        let own: DMat3 = self.members().map(inertia).fold(DMat3::ZERO, |sum, own| sum + own);
-        let change = own.inverse() * (momentum.angular - self.now().angular);
+        let now = self.now();
+        let change = now.own.inverse() * (momentum.angular - now.angular);
         for i in self.members().filter(|_| change.is_finite()) {
             let row = &mut self.problem.bodies[i];
             row.w = (Vec3::from(row.w).as_dvec3() + change).as_vec3().to_array();

@@ -49,6 +49,14 @@ impl fmt::Debug for BodyHandle {
     }
 }
 
+/// As its index.
+#[cfg(feature = "serde")]
+impl serde::Serialize for BodyHandle {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        self.index().serialize(serializer)
+    }
+}
+
 /// The first body at an index, in any world.
 impl From<usize> for BodyHandle {
     fn from(index: usize) -> Self {

@@ -2,7 +2,7 @@
 
 use drystone::backend::BackendChoice;
 use drystone::metrics::rms_speed;
-use drystone::{BodyHandle, Cpu, Error, Result};
+use drystone::{Cpu, Error, Result};
 use drystone_conform::compare::BodyDifference;
 use drystone_scenes::{Recorder, RecordingIntervals, Replay, SceneFile};
 use drystone_view::{Camera, ColorBy, Live, Overlay, Pointer, Show as _};
@@ -286,8 +286,7 @@ impl Show {
 #[wasm_bindgen]
 pub fn first_difference(a: &Show, b: &Show) -> Option<String> {
     let found = BodyDifference::first(&a.live.simulation.world, &b.live.simulation.world)?;
-    let BodyDifference { bodies, quantity, values } = found;
-    let body = bodies[0].or(bodies[1]).map_or(0, BodyHandle::index);
-    let values = values.map(|value| format!("{value:?}"));
+    let (body, quantity) = (found.index(), found.quantity);
+    let values = found.values.map(|value| format!("{value:?}"));
     Some(json!({"step": a.live.steps, "body": body, "quantity": quantity, "values": values}).to_string())
 }
