@@ -34,11 +34,15 @@ const ASLANT: f32 = 0.05;
 const ROUNDING: f32 = 5e-7;
 
 /// The colliders of a world that can lie flush with others.
+#[derive(Clone, Copy)]
 pub(super) struct Neighbors<'a> {
     pub colliders: &'a [ColliderInfo],
     pub tree: &'a Tree,
     pub planes: &'a [Plane],
     pub input: &'a DetectionInput<'a>,
+    /// How much deeper a point can be than the bodies come, because their path leaves out the contacts that hold them
+    /// (m).
+    pub fall: f32,
 }
 
 /// Reusable memory of one thread.
@@ -230,18 +234,18 @@ impl Neighbors<'_> {
         let bend = if is_exact { 0.0 } else { other.size };
         for point in &found.points {
             let p = point.local_p1;
-            let around = exact.max(TRUE * size).max(ASLANT * (bend + point.dist));
+            let around = exact.max(TRUE * size).max(ASLANT * (bend + point.dist)) + self.fall;
             // Parry's other points can lie anywhere on the shape.
             if point.dist > nearest_dist + around {
                 continue;
             }
             self.find_near([of.own, of.other], of.pose * p, around, near);
             near.retain(|c| flush(c).holds(p, around));
-            let is_behind = |c: &u32| {
-                let (beyond, distance) = flush(c).beyond(n, p, (p, around), size);
-                beyond <= SAME * (distance + 0.1 * size)
-            };
-            if near.iter().all(is_behind) {
+            let is_behind = |(beyond, distance): (f32, f32)| beyond <= SAME * (distance + 0.1 * size);
+            let away = solid.furthest(n) - p;
+            let is_own_behind = is_behind((n.dot(away), away.length()));
+            let is_other_behind = |c: &u32| is_behind(flush(c).beyond(n, p, (p, around), size));
+            if is_own_behind && near.iter().all(is_other_behind) {
                 return false;
             }
             faces.clear();
@@ -253,6 +257,10 @@ impl Neighbors<'_> {
                 let top = solid.furthest(d);
                 d.dot(top - p) <= around && near.iter().all(|c| flush(c).beyond(d, top, (p, around), size).0 <= exact)
             });
+            // At an edge of a shape that stands alone, parry's error can point out of the cone.
+            if near.is_empty() && faces.len() > 1 {
+                return false;
+            }
             let mut consider = |face: Face| {
                 let d = face.normal;
                 let along = d.dot(touching.furthest(-d) - solid.furthest(d)) - touching.radius;

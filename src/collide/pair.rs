@@ -281,6 +281,14 @@ fn candidate(
     }
     let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);
     let p2 = m.subshape_pos2().map_or(p.local_p2, |pose| pose * p.local_p2);
+    let [on_side_a, on_side_b] = [(ca, a, p1, normal), (cb, b, p2, -normal)].map(|(c, body, p, out)| {
+        let turn = pose((c, body)).rotation;
+        to_side(c, turn.inverse() * out, p).map(|way| turn * way)
+    });
+    let moved = |own: Option<Vec3>, other: Option<Vec3>, (c, body): Side| {
+        own.or(other).map_or(Vec3::ZERO, |way| pose((c, body)).rotation.inverse() * way)
+    };
+    let (p1, p2) = (p1 + moved(on_side_a, on_side_b, (ca, a)), p2 + moved(on_side_b, on_side_a, (cb, b)));
     let (anchor_a, anchor_b) = (ca.local * p1, cb.local * p2);
     // Arms to the point midway between overlapping surfaces. Surfaces apart push each other when they meet, so each arm
     // leads to its own surface then. Subtract the centers first: the differences are small.
@@ -299,6 +307,20 @@ fn candidate(
     })
 }
 
+/// The way from a point to the line on the side of a cylinder where its surface has this outward normal, in the frame
+/// of the shape (m). `None` for other surfaces. Parry's points lie up to 0.3 % of the radius beside that line, where the
+/// spin of a cylinder that rolls would lift it.
+fn to_side(c: &ColliderInfo, normal: Vec3, p: Vec3) -> Option<Vec3> {
+    let cylinder = c.shape.as_cylinder().filter(|_| c.cuboid.is_none() && is_across(normal))?;
+    let out = cylinder.radius * Vec3::new(normal.x, 0.0, normal.z).normalize();
+    Some(Vec3::new(out.x - p.x, 0.0, out.z - p.z))
+}
+
+/// Whether a cylinder touches with its side along a normal in its own frame.
+fn is_across(normal: Vec3) -> bool {
+    normal.y.abs() < 0.1
+}
+
 /// Radius of the surface that a shape touches with along `normal`, in its own frame (m): that of a ball, or of the side
 /// of a cylinder.
 fn curvature(c: &ColliderInfo, normal: Vec3) -> f32 {
@@ -308,7 +330,7 @@ fn curvature(c: &ColliderInfo, normal: Vec3) -> f32 {
     match c.shape.as_typed_shape() {
         TypedShape::Ball(ball) => ball.radius,
         TypedShape::Capsule(capsule) => capsule.radius,
-        TypedShape::Cylinder(cylinder) if normal.y.abs() < 0.1 => cylinder.radius,
+        TypedShape::Cylinder(cylinder) if is_across(normal) => cylinder.radius,
         _ => 0.0,
     }
 }

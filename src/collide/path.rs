@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::collider::{BodyState, FARTHEST};
 use super::cuboids::{CuboidPair, CuboidScratch, cuboid_contacts};
+use super::flush::Neighbors;
 use super::manifold::{MAX_POINTS, Manifold};
 use super::narrow::Narrow;
 use super::pair::{Pair, PairScratch, Update};
@@ -130,15 +131,17 @@ impl Narrow<'_> {
             (&self.colliders[pair.collider_b as usize], &then[1]),
         ];
         let places = [pair.collider_a, pair.collider_b];
+        let fall = met.time * 0.5 * step * step * (bodies[1].pull - bodies[0].pull).length();
+        let neighbors = Some(&Neighbors { fall, ..self.neighbors });
         let update = if places.iter().all(|&c| self.cuboids[c as usize].is_cuboid()) {
             let one = [CuboidPair { bodies: [0, 1], cuboids: places, prediction, number: 0 }];
             let mut update = None;
             cuboid_contacts(InstructionSet::default(), &then, self.cuboids, &one, cuboids, &mut |_, write| {
-                update = Some(pair.take_over(sides, prediction, write, Some(&self.neighbors), scratch));
+                update = Some(pair.take_over(sides, prediction, write, neighbors, scratch));
             });
             update.unwrap_or_else(|| pair.part())
         } else {
-            pair.compute(sides, prediction, Some(&self.neighbors), scratch)
+            pair.compute(sides, prediction, neighbors, scratch)
         };
         let drift = (then[1].center - then[0].center) - (bodies[1].center - bodies[0].center);
         let turns = ways.map(|way| way.turned(met.time));

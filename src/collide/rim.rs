@@ -171,9 +171,14 @@ impl Beside<'_> {
             each_triangle(composite, &Aabb::from_half_extents(p, Vec3::splat(*around)), |facet, triangle| {
                 let (free, Some(face)) = (facet.free_edges(), triangle.normal()) else { return };
                 let edges = triangle.edges().into_iter().zip(free).filter(|(_, is_free)| *is_free);
-                for (edge, _) in edges.filter(|(edge, _)| edge.distance_to_local_point(p, true) <= *around) {
+                for (edge, _) in edges {
+                    // A shape that lies flush with the edge can be further than that from a point beside it.
+                    let on_edge = edge.project_local_point(p, true).point;
+                    if on_edge.distance(p) > *around {
+                        continue;
+                    }
                     let out = (edge.b - edge.a).cross(face).normalize_or(face);
-                    let at = [p, out];
+                    let at = [on_edge, out];
                     let is_covered = goes_on((composite, Pose::IDENTITY), at, *around, directions);
                     let list =
                         if other_goes_on(at, directions) | is_covered { &mut *covered } else { &mut *directions };

@@ -373,7 +373,7 @@ impl WorldContacts {
     /// Updates the contacts of all pairs. `parted` tells whether an ended pair had a contact.
     pub fn narrow_phase(&mut self, input: &DetectionInput, parted: bool) -> DetectStats {
         let Self { colliders, cuboids, tree, planes, pairs, changed, .. } = self;
-        let neighbors = Neighbors { colliders, tree, planes, input };
+        let neighbors = Neighbors { colliders, tree, planes, input, fall: 0.0 };
         let narrow = Narrow { colliders, cuboids, moving: input.moving, margins: input.margins, neighbors };
         let updates: Vec<Updated> = pairs.par_chunks_mut().flat_map_iter(|chunk| narrow.update(chunk)).collect();
         let mut stats = DetectStats { pairs: pairs.len(), reshaped: parted, ..DetectStats::default() };
