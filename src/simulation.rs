@@ -496,8 +496,8 @@ impl Simulation {
     }
 
     /// Whether a body sleeps; see [`SolverConfig::sleep_after`]. False if the body is gone.
-    pub fn is_asleep(&self, body: impl Into<BodyHandle>) -> bool {
-        self.world.bodies.index_of(body.into()).is_some_and(|index| self.asleep().get(index) == Some(&true))
+    pub fn is_asleep(&self, body: BodyHandle) -> bool {
+        self.world.bodies.index_of(body).is_some_and(|index| self.asleep().get(index) == Some(&true))
     }
 
     /// The number of the state after the last step, `load` or `restore`. No other state of this process has the same
@@ -513,15 +513,15 @@ impl Simulation {
 
     /// The number of substeps that a body takes in a step; see [`SolverConfig::max_substeps`]. If the body is gone, the
     /// smallest number of the world.
-    pub fn substeps_of(&self, body: impl Into<BodyHandle>) -> u32 {
-        let index = self.world.bodies.index_of(body.into());
+    pub fn substeps_of(&self, body: BodyHandle) -> u32 {
+        let index = self.world.bodies.index_of(body);
         self.config.substeps << index.map_or(0, |index| self.stages.effort.class_of(index))
     }
 
     /// Wakes the island of a body, if the body sleeps. A change of a sleeping body, of gravity or of a joint wakes it
     /// without this call.
-    pub fn wake(&mut self, body: impl Into<BodyHandle>) {
-        if let Some(index) = self.world.bodies.index_of(body.into()) {
+    pub fn wake(&mut self, body: BodyHandle) {
+        if let Some(index) = self.world.bodies.index_of(body) {
             self.stages.sleep.wake(index);
         }
     }

@@ -3,7 +3,7 @@
 use bevy_ecs::entity::{EntityMapper, MapEntities};
 use bevy_ecs::prelude::*;
 use bevy_math::Vec3;
-use drystone::{Body, World as Bodies};
+use drystone::{Body, BodyHandle, World as Bodies};
 
 use crate::components::Order;
 use crate::error::PhysicsError;
@@ -44,12 +44,13 @@ pub struct Joint {
 impl Joint {
     /// A ball joint between two bodies, at anchors in their frames (m).
     pub fn new(body_a: Entity, anchor_a: Vec3, body_b: Entity, anchor_b: Vec3) -> Self {
-        Self { body_a, body_b: Some(body_b), settings: drystone::Joint::new(0, anchor_a, 1, anchor_b) }
+        let [a, b] = [BodyHandle::default(); 2];
+        Self { body_a, body_b: Some(body_b), settings: drystone::Joint::new(a, anchor_a, b, anchor_b) }
     }
 
     /// A ball joint between a body, at an anchor in its frame, and a point of the world (m).
     pub fn to_world(body_a: Entity, anchor_a: Vec3, point: Vec3) -> Self {
-        Self { body_a, body_b: None, settings: drystone::Joint::to_world(0, anchor_a, point) }
+        Self { body_a, body_b: None, settings: drystone::Joint::to_world(BodyHandle::default(), anchor_a, point) }
     }
 
     /// The same with other settings: a kind, limits, a motor.
@@ -69,11 +70,9 @@ impl Joint {
         let (body_a, body_b) = (of(self.body_a)?, self.body_b.map(of).transpose()?);
         // Two bodies whose only joint this is.
         let mut alone = Bodies::new();
-        for _ in 0..2 {
-            alone.insert(Body::fixed());
-        }
-        let other = |b| usize::from(b != self.body_a).into();
-        alone.insert_joint(drystone::Joint { body_a: 0.into(), body_b: self.body_b.map(other), ..self.settings });
+        let [a, b] = [0; 2].map(|_| alone.insert(Body::fixed()));
+        let other = |entity| if entity == self.body_a { a } else { b };
+        alone.insert_joint(drystone::Joint { body_a: a, body_b: self.body_b.map(other), ..self.settings });
         alone.check_joints().map_err(|error| error.to_string().replacen("joint 0: ", "", 1))?;
         Ok(drystone::Joint { body_a, body_b, ..self.settings })
     }

@@ -14,12 +14,11 @@ use crate::saved::{Archive, Columns, Saved};
 /// the next body at the same index gets another handle.
 ///
 /// A world refuses handles of an unrelated world ([`World::new`](super::World::new)). A world, its clones, its forks
-/// and its snapshots accept each other's handles. A world that was loaded, or collected from an iterator of bodies, has
-/// no identity: it accepts any handle, and any world accepts its handles. Handles compare by index and generation
-/// alone, so handles of two worlds can be equal.
+/// and its snapshots accept each other's handles. A world that was loaded, and [`Bodies`] that were collected from an
+/// iterator, have no identity: they accept any handle, and any world accepts theirs. Handles compare by index and
+/// generation alone, so handles of two worlds can be equal.
 ///
-/// An index converts to the handle of the *first* body at that index: that of the body itself as long as no body was
-/// removed there.
+/// The default handle names no body.
 ///
 /// ```
 /// use drystone::{Body, BodyHandle, World};
@@ -57,10 +56,10 @@ impl serde::Serialize for BodyHandle {
     }
 }
 
-/// The first body at an index, in any world.
-impl From<usize> for BodyHandle {
-    fn from(index: usize) -> Self {
-        Self { index: u32::try_from(index).unwrap_or(u32::MAX), generation: 0, tag: WorldTag::default() }
+/// Names no body.
+impl Default for BodyHandle {
+    fn default() -> Self {
+        Self { index: u32::MAX, generation: 0, tag: WorldTag::default() }
     }
 }
 
@@ -285,10 +284,7 @@ impl Bodies {
             _ if !handle.tag.fits(self.tag) => input!("names body {index} of another world"),
             None => input!("names body {index}, beyond the last of {count}"),
             Some(_) if self.is_vacant(index) => input!("names body {index}, which was removed"),
-            Some(other) => input!(
-                "names body {index}, which was removed: {:?} has its index now (an index names only the first body there; use a handle)",
-                other.name
-            ),
+            Some(other) => input!("names body {index}, which was removed: {:?} has its index now", other.name),
         })
     }
 

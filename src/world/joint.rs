@@ -35,11 +35,13 @@ use crate::saved::{Archive, Saved};
 /// ```
 ///
 /// ```
-/// use drystone::{Axis, Joint, Linear, glam::{Quat, Vec3}};
+/// use drystone::{Axis, Body, Joint, Linear, World, glam::{Quat, Vec3}};
 ///
+/// # let mut world = World::new();
+/// # let [a, b, other] = [(); 3].map(|()| world.insert(Body::fixed()));
 /// let anchors = (Vec3::X, Vec3::NEG_X);
-/// let ball = Joint::new(0, anchors.0, 1, anchors.1);
-/// assert!(ball.is_ball() && ball.holds_anchors() && ball.holds(0) && ball.holds(1) && !ball.holds(2));
+/// let ball = Joint::new(a, anchors.0, b, anchors.1);
+/// assert!(ball.is_ball() && ball.holds_anchors() && ball.holds(a) && ball.holds(b) && !ball.holds(other));
 /// let door = ball.hinge(Vec3::Y).limited(0.0, 1.5).spring(0.0, 1.0, 0.7).breaking_at(500.0).colliding();
 /// assert!(door.holds_anchors() && !door.is_ball() && door.collide);
 /// let piston = ball.slider(Vec3::Y).motor(0.5, 100.0);
@@ -52,10 +54,10 @@ use crate::saved::{Archive, Saved};
 /// assert_eq!(spring, ball.at_distance(Axis::FREE.spring(2.0, 1.5, 0.1, f32::MAX)));
 /// // A screw without thread: free to translate along its axis and to rotate about it.
 /// let bolt = ball.along(Vec3::Z).generic([Axis::FREE, Axis::LOCKED, Axis::LOCKED], [Axis::FREE, Axis::LOCKED, Axis::LOCKED]);
-/// // Angles are zero with body 0 turned by a quarter.
+/// // Angles are zero with body a turned by a quarter.
 /// let bolt = bolt.zero_at(Quat::from_rotation_z(1.5), Quat::IDENTITY);
 /// assert!(bolt.clone().first_axis().is_some() && weld.clone().first_axis().is_none());
-/// assert_eq!(Joint::to_world(0, anchors.0, Vec3::Y).body_b, None);
+/// assert_eq!(Joint::to_world(a, anchors.0, Vec3::Y).body_b, None);
 /// # let _ = (piston, barrier);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,9 +99,10 @@ pub struct Joint {
 /// How a joint guides the anchor of a.
 ///
 /// ```
-/// use drystone::{Axis, Joint, Linear, glam::Vec3};
+/// use drystone::{Axis, Body, Joint, Linear, World, glam::Vec3};
 ///
-/// let joint = Joint::to_world(0, Vec3::ZERO, Vec3::Y);
+/// let body = World::new().insert(Body::fixed());
+/// let joint = Joint::to_world(body, Vec3::ZERO, Vec3::Y);
 /// assert_eq!(joint.linear, Linear::Axes([Axis::LOCKED; 3]));
 /// assert_eq!(joint.rope(1.0).linear, Linear::Distance(Axis::limited(0.0, 1.0)));
 /// ```
@@ -151,16 +154,15 @@ pub(super) const NO_FRAME: Quat = Quat::from_xyzw(0.0, 0.0, 0.0, 0.0);
 pub(super) const NOWHERE: Bounds = Bounds::Between { min: f32::INFINITY, max: f32::NEG_INFINITY };
 
 impl Joint {
-    /// A ball joint between two bodies. Joined bodies do not collide with each other. An index names the first body
-    /// that was added at that index: use a handle in a world from which bodies are removed.
-    pub fn new(body_a: impl Into<BodyHandle>, anchor_a: Vec3, body_b: impl Into<BodyHandle>, anchor_b: Vec3) -> Self {
-        Self { body_b: Some(body_b.into()), ..Self::to_world(body_a, anchor_a, anchor_b) }
+    /// A ball joint between two bodies, at anchors in their frames (m). Joined bodies do not collide with each other.
+    pub fn new(body_a: BodyHandle, anchor_a: Vec3, body_b: BodyHandle, anchor_b: Vec3) -> Self {
+        Self { body_b: Some(body_b), ..Self::to_world(body_a, anchor_a, anchor_b) }
     }
 
-    /// A ball joint between a body and a point of the world.
-    pub fn to_world(body_a: impl Into<BodyHandle>, anchor_a: Vec3, point: Vec3) -> Self {
+    /// A ball joint between a body, at an anchor in its frame, and a point of the world (m).
+    pub fn to_world(body_a: BodyHandle, anchor_a: Vec3, point: Vec3) -> Self {
         Self {
-            body_a: body_a.into(),
+            body_a,
             body_b: None,
             anchor_a,
             anchor_b: point,
@@ -440,8 +442,7 @@ impl Joint {
     }
 
     /// Whether the joint holds this body.
-    pub fn holds(&self, body: impl Into<BodyHandle>) -> bool {
-        let body = body.into();
+    pub fn holds(&self, body: BodyHandle) -> bool {
         self.body_a.is(body) || self.body_b.is_some_and(|b| b.is(body))
     }
 

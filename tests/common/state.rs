@@ -1,12 +1,19 @@
-//! The scalar backend, and the state of bodies as bits. Each set of tests uses a part of it.
+//! The scalar backend, handles of bodies, and the state of bodies as bits. Each set of tests uses a part of it.
 #![allow(dead_code)]
 
 use drystone::glam::Vec3;
-use drystone::{Backend, Body, Reference, Simulation, World};
+use drystone::world::Bodies;
+use drystone::{Backend, Body, BodyHandle, Reference, Simulation, World};
 
 /// Opens the scalar backend.
 pub fn reference() -> Box<dyn Backend> {
     Box::new(Reference::<f32>::new())
+}
+
+/// The handle of the first body at an index, in any world, also in one that has no such body.
+pub fn handle(index: usize) -> BodyHandle {
+    let bodies: Bodies = (0..=index).map(|_| Body::fixed()).collect();
+    bodies.handle(index).expect("a body")
 }
 
 /// Every bit of the pose and the velocity of a body.

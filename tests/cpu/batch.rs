@@ -389,7 +389,8 @@ fn a_mass_is_scaled_from_that_of_the_start_and_no_other_changes() {
 #[test]
 fn a_joint_that_breaks_leaves_its_columns_empty() {
     let mut scene = scene("sphere-plane", &[]);
-    scene.world.insert_joint(Joint::to_world(1, Vec3::ZERO, Vec3::new(0.0, 2.5, 0.0)).breaking_at(1.0));
+    let ball = scene.world.bodies.handle(1).expect("a ball");
+    scene.world.insert_joint(Joint::to_world(ball, Vec3::ZERO, Vec3::new(0.0, 2.5, 0.0)).breaking_at(1.0));
     let mut batch = batch_of(&scene, &SolverConfig::default(), 1).expect("a world");
     assert!(batch.step(1, &[0]).expect("a world").is_empty());
     let event = batch.events(&[0]).expect("a world")[0];

@@ -33,7 +33,12 @@ fn out_of_place(scene: &Scene, simulation: &Simulation) -> usize {
 }
 
 fn most_substeps(simulation: &Simulation) -> u32 {
-    (0..simulation.world.bodies.len()).map(|body| simulation.substeps_of(body)).max().expect("a body")
+    simulation.world.bodies.handles().map(|body| simulation.substeps_of(body)).max().expect("a body")
+}
+
+/// The substeps of the body at an index.
+fn substeps_at(simulation: &Simulation, index: usize) -> u32 {
+    simulation.substeps_of(simulation.world.bodies.handle(index).expect("a body"))
 }
 
 /// The limit of the push is one of speed: a spring that it held to a force let every load above 1e4 times the mass sink through.
@@ -72,7 +77,7 @@ fn across_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> Simulation {
 fn substeps_of_a_rod(speed: f32, joint: impl Fn(Joint) -> Joint) -> u32 {
     let mut simulation = across_a_rod(speed, joint);
     run(&mut simulation, 2);
-    simulation.substeps_of(0)
+    substeps_at(&simulation, 0)
 }
 
 /// A substep h at the speed u across a rod of the length d opens it by (h u)²/2d, of which the next substep closes a part.
@@ -118,11 +123,11 @@ fn a_drive_along_a_rod_changes_nothing() {
 fn joints_that_are_swept_from_now_on_return_to_the_substeps_of_the_settings() {
     let mut simulation = across_a_rod(30.0, |joint| joint.rod(1.0));
     run(&mut simulation, 2);
-    assert!(simulation.substeps_of(0) > 8, "{} substeps", simulation.substeps_of(0));
+    assert!(substeps_at(&simulation, 0) > 8, "{} substeps", substeps_at(&simulation, 0));
     let swept = simulation.config().clone().with(|c| c.joint_solver = JointSolver::Sweeps);
     simulation.set_config(swept).expect("good settings");
     run(&mut simulation, 120);
-    assert_eq!(simulation.substeps_of(0), 8);
+    assert_eq!(substeps_at(&simulation, 0), 8);
 }
 
 /// A stack and a chain compute the same bits, whether a rod beside them takes steps again or not.
@@ -294,7 +299,7 @@ fn a_net_under_a_heavy_ball_keeps_its_joints_closed() {
 fn a_net_that_catches_a_heavy_ball_keeps_its_joints_closed() {
     let mut world = find("joint-grid", &["n=16", "ratio=1"]).world;
     let far = world.bodies.iter().map(|body| body.position.z).fold(0.0, f32::max);
-    let last: Vec<usize> = (0..world.bodies.len()).filter(|&i| world.bodies[i].position.z == far).collect();
+    let last: Vec<BodyHandle> = world.bodies.handles().filter(|&i| world.bodies[i].position.z == far).collect();
     for i in last {
         let anchor = world.bodies[i].position + 0.25 * Vec3::Z;
         world.insert_joint(Joint::to_world(i, 0.25 * Vec3::Z, anchor));
@@ -349,9 +354,9 @@ fn an_island_without_need_keeps_its_substeps() {
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 120);
     let substeps = |wanted: fn(&Body) -> bool| -> Vec<u32> {
-        let bodies =
-            simulation.world.bodies.iter().enumerate().filter(|(_, b)| b.kind == BodyKind::Dynamic && wanted(b));
-        let mut all: Vec<u32> = bodies.map(|(i, _)| simulation.substeps_of(i)).collect();
+        let bodies = &simulation.world.bodies;
+        let is_wanted = |&b: &BodyHandle| bodies[b].kind == BodyKind::Dynamic && wanted(&bodies[b]);
+        let mut all: Vec<u32> = bodies.handles().filter(is_wanted).map(|b| simulation.substeps_of(b)).collect();
         all.dedup();
         all
     };
@@ -471,7 +476,7 @@ fn a_plate_that_moves_ties_what_lies_on_it() {
     for (speed, tied) in [(0.0, false), (0.01, true)] {
         let mut simulation = started(&on_a_plate(speed), SolverConfig::default());
         run(&mut simulation, 10);
-        let [plate, heavy, light] = [0, 1, 10].map(|body| simulation.substeps_of(body));
+        let [plate, heavy, light] = [0, 1, 10].map(|body| substeps_at(&simulation, body));
         assert!(heavy >= 32, "{heavy} substeps");
         assert_eq!(light, if tied { heavy } else { 8 }, "{speed} m/s");
         assert!(!tied || plate == heavy, "{plate} and not {heavy} substeps of the plate");
@@ -482,13 +487,14 @@ fn a_plate_that_moves_ties_what_lies_on_it() {
 #[test]
 fn a_plate_that_moves_ties_what_hangs_from_it() {
     let mut scene = on_a_plate(0.01);
-    let at = scene.world.bodies[0].position + Vec3::new(0.0, -3.0, 0.0);
+    let plate = scene.world.bodies.handle(0).expect("a plate");
+    let at = scene.world.bodies[plate].position + Vec3::new(0.0, -3.0, 0.0);
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z);
     let rod = scene.world.insert(rod);
-    scene.world.insert_joint(Joint::new(0, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
+    scene.world.insert_joint(Joint::new(plate, Vec3::new(0.0, -3.0, 0.0), rod, 0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 10);
-    assert_eq!(simulation.substeps_of(rod), simulation.substeps_of(0));
+    assert_eq!(simulation.substeps_of(rod), simulation.substeps_of(plate));
     assert!(simulation.substeps_of(rod) >= 32 && simulation.world.joint_gap() < 1e-3);
     let mut open = |i: usize| {
         Ok(if i == 0 { Box::new(Reference::<f32>::new()) as Box<dyn Backend> } else { Box::new(Cpu::new()) })
@@ -501,7 +507,9 @@ fn a_plate_that_moves_ties_what_hangs_from_it() {
 #[test]
 fn several_efforts_keep_what_backends_rely_on() {
     let mut scene = efforts::islands();
-    let top = scene.world.bodies.iter().position(|b| b.position.x == 20.0 && b.position.y > 5.0).expect("a top");
+    let bodies = &scene.world.bodies;
+    let is_top = |&b: &BodyHandle| bodies[b].position.x == 20.0 && bodies[b].position.y > 5.0;
+    let top = bodies.handles().find(is_top).expect("a top");
     let at = scene.world.bodies[top].position + Vec3::Y;
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y + 0.3, at.z);
     let rod = scene.world.insert(rod);
@@ -562,10 +570,11 @@ fn the_rows_of_an_island_are_those_of_its_substeps() {
 fn the_impulse_of_a_joint_follows_the_class() {
     let mut scene = on_a_plate(0.0);
     scene.world.bodies = scene.world.bodies.iter().take(6).cloned().collect();
-    let at = scene.world.bodies[5].position + Vec3::Y;
+    let top = scene.world.bodies.handle(5).expect("a top");
+    let at = scene.world.bodies[top].position + Vec3::Y;
     let rod = Body::dynamic().shape(Shape::cuboid(0.05, 0.3, 0.1)).position(at.x, at.y - 0.3, at.z + 2.0);
     let rod = scene.world.insert(rod);
-    scene.world.insert_joint(Joint::new(5, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
+    scene.world.insert_joint(Joint::new(top, Vec3::new(0.0, 1.0, 2.0), rod, 0.3 * Vec3::Y));
     let mut simulation = started(&scene, SolverConfig::default());
     run(&mut simulation, 60);
     let (before, substeps) = (joint_impulses(&simulation)[0], most_substeps(&simulation));

@@ -172,7 +172,8 @@ fn a_pile_needs_no_more_colors_than_there_are() {
 fn joints_are_swept_before_contacts_and_solved_after_them() {
     use drystone::config::JointSolver;
     let mut world = row(&cube(), 0.5, 0.0);
-    world.insert_joint(drystone::Joint::new(1, Vec3::X, 2, -Vec3::X));
+    let [a, b] = [1, 2].map(|i| world.bodies.handle(i).expect("a cube"));
+    world.insert_joint(drystone::Joint::new(a, Vec3::X, b, -Vec3::X));
     let config = SolverConfig::default().with(|c| {
         c.substeps = 1;
         c.iterations = 2;

@@ -43,7 +43,10 @@ fn recorded() -> (Vec<u8>, Simulation) {
             15 => world.bodies[7].linear_velocity = Vec3::new(2.0, 1.0, 0.0),
             20 => world.bodies[8].kind = BodyKind::Fixed,
             25 => world.gravity = Vec3::new(1.0, -8.0, 0.0),
-            30 => drop(world.insert_joint(Joint::new(11, 0.5 * Vec3::Y, 12, -0.5 * Vec3::Y))),
+            30 => {
+                let [a, b] = [11, 12].map(|i| world.bodies.handle(i).expect("a cube"));
+                world.insert_joint(Joint::new(a, 0.5 * Vec3::Y, b, -0.5 * Vec3::Y));
+            }
             35 => world.bodies[12].groups = Groups { membership: 2, filter: 3 },
             40 => world.bodies[13].colliders[0].shape = Shape::ball(0.5),
             45 => world.bodies[14].force = Vec3::new(0.0, 5e3, 0.0),
@@ -55,7 +58,7 @@ fn recorded() -> (Vec<u8>, Simulation) {
                 world.bodies[1].position += 2.0 * Vec3::Z;
                 world.bodies[1].rotation = Quat::from_rotation_y(0.3);
             }
-            100 => simulation.wake(2),
+            100 => simulation.wake(simulation.world.bodies.handle(2).expect("a cube")),
             _ => {}
         }
         let dt = if step % 7 == 3 { 0.5 * DT } else { DT };

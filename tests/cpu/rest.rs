@@ -201,16 +201,14 @@ fn a_table_without_one_of_its_legs_falls_and_a_whole_one_stands() {
 fn a_leaning_tower_is_held_as_far_as_its_weight_lies_over_its_foot() {
     for (blocks, held) in [(3, 3), (6, 3)] {
         let mut world = floor();
-        let first = world.bodies.len();
-        for k in 0..blocks {
-            world.insert(cube().position(0.3 * k as f32, 0.5 + k as f32, 0.0));
-        }
+        let tower: Vec<BodyHandle> =
+            (0..blocks).map(|k| world.insert(cube().position(0.3 * k as f32, 0.5 + k as f32, 0.0))).collect();
         let mut simulation = started(&world, awake());
-        for k in 0..blocks {
-            assert_eq!(begins_with(&mut simulation, (first + k).into()) > 0.0, k < held, "block {k} of {blocks}");
+        for (k, &block) in tower.iter().enumerate() {
+            assert_eq!(begins_with(&mut simulation, block) > 0.0, k < held, "block {k} of {blocks}");
         }
         run(&mut simulation, 90);
-        let turned = simulation.world.bodies[first + blocks - 1].rotation.to_axis_angle().1;
+        let turned = simulation.world.bodies[tower[blocks - 1]].rotation.to_axis_angle().1;
         assert_eq!(turned > 0.05, held < blocks, "{blocks} blocks: {turned} rad");
     }
 }

@@ -14,7 +14,8 @@ fn turning_board(rate: f32) -> World {
 
 /// Where a body of `simulation` is along its board [m].
 fn along_board(simulation: &Simulation, body: BodyHandle) -> f32 {
-    let [board, body] = [0.into(), body].map(|i| &simulation.world.bodies[i]);
+    let bodies = &simulation.world.bodies;
+    let (board, body) = (&bodies[0], &bodies[body]);
     (board.rotation.inverse() * body.position).x
 }
 

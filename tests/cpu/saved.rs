@@ -306,7 +306,7 @@ fn handles_name_the_same_bodies_and_joints_after_loading() {
     let cube = || Body::dynamic().shape(Shape::cuboid(0.5, 0.5, 0.5));
     let bodies: Vec<_> =
         (0..4).map(|i| world.insert(cube().position(2.0 * i as f32, 0.0, 0.0).named(format!("cube {i}")))).collect();
-    let joints = [0, 1].map(|i| world.insert_joint(Joint::new(i, Vec3::X, i + 1, -Vec3::X)));
+    let joints = [0, 1].map(|i| world.insert_joint(Joint::new(bodies[i], Vec3::X, bodies[i + 1], -Vec3::X)));
     world.remove_joint(joints[0]);
     world.remove(bodies[3]);
     let mut simulation = Simulation::with(world, SolverConfig::default(), cpu()).expect("a good world");
@@ -380,7 +380,7 @@ fn a_pile_at_rest_takes_few_bytes_a_body() {
     let mut simulation =
         Simulation::with(scene("pile", &["n=200"]), SolverConfig::default(), cpu()).expect("a good world");
     (0..400).for_each(|_| drop(simulation.step(DT).expect("a step")));
-    assert_eq!((0..simulation.world.bodies.len()).filter(|&body| simulation.is_asleep(body)).count(), 200);
+    assert_eq!(simulation.world.bodies.handles().filter(|&body| simulation.is_asleep(body)).count(), 200);
     let bytes = simulation.save().len() / 200;
     assert!(bytes <= 300, "{bytes} bytes a body");
 }

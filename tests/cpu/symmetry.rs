@@ -197,9 +197,9 @@ fn reordered() -> Symmetry {
     let forth = |case: &Case| {
         let mut world = World { gravity: case.world.gravity, ..World::new() };
         let count = case.world.bodies.len();
-        case.world.bodies.iter().rev().for_each(|body| _ = world.insert(body.clone()));
+        let bodies: Vec<BodyHandle> = case.world.bodies.iter().rev().map(|body| world.insert(body.clone())).collect();
         for joint in case.world.joints.iter() {
-            let place = |body: BodyHandle| BodyHandle::from(count - 1 - body.index());
+            let place = |body: BodyHandle| bodies[count - 1 - body.index()];
             world.insert_joint(Joint { body_a: place(joint.body_a), body_b: joint.body_b.map(place), ..*joint });
         }
         Case { world, ..case.clone() }

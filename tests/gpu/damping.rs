@@ -96,12 +96,13 @@ fn mixture() -> World {
         world.insert(cube().position(0.0, 0.5 + i as f32, 0.0).linear_damping(rate).angular_damping(0.5 * rate));
     }
     let plank = Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).position(3.0, 3.0, 0.0);
-    world.insert(plank.velocity(Vec3::X, Vec3::new(3.0, 1.0, 0.2)).angular_damping(0.7));
-    world.insert(Body::dynamic().shape(Shape::ball(0.3)).position(3.0, 4.0, 0.0).linear_damping(1.0));
-    world.insert(Body::dynamic().shape(Shape::ball(0.3)).position(3.0, 5.0, 0.0).velocity(Vec3::Z, -Vec3::ZERO));
-    world.insert_joint(Joint::new(5, Vec3::Y, 6, Vec3::ZERO));
-    world.insert_joint(Joint::new(6, Vec3::Y, 7, Vec3::ZERO));
-    world.bodies[5].torque = Vec3::new(0.1, 0.0, 0.4);
+    let plank = world.insert(plank.velocity(Vec3::X, Vec3::new(3.0, 1.0, 0.2)).angular_damping(0.7));
+    let ball = |y: f32| Body::dynamic().shape(Shape::ball(0.3)).position(3.0, y, 0.0);
+    let [near, far] =
+        [ball(4.0).linear_damping(1.0), ball(5.0).velocity(Vec3::Z, -Vec3::ZERO)].map(|ball| world.insert(ball));
+    world.insert_joint(Joint::new(plank, Vec3::Y, near, Vec3::ZERO));
+    world.insert_joint(Joint::new(near, Vec3::Y, far, Vec3::ZERO));
+    world.bodies[plank].torque = Vec3::new(0.1, 0.0, 0.4);
     world.bodies[4].linear_velocity.x = 2.0;
     world
 }

@@ -2,7 +2,7 @@
 
 use drystone::config::JointSolver;
 use drystone::glam::{Quat, Vec3};
-use drystone::{Axis, Body, Bounds, Cpu, Joint, Linear, Reference, Shape, Simulation, SolverConfig, World};
+use drystone::{Axis, Body, BodyHandle, Bounds, Cpu, Joint, Linear, Reference, Shape, Simulation, SolverConfig, World};
 use drystone_scenes::CATALOGUE;
 
 use crate::common::Open;
@@ -257,7 +257,8 @@ fn a_slider_that_spins_keeps_its_energy() {
 fn a_rope_is_solved_with_its_set() {
     let mut world = with_joints(chain(5, 100.0), |joint| joint.hinge(Vec3::Z));
     let bob = world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(2.0, -1.0, 0.0));
-    world.insert_joint(Joint::new(3, 0.25 * Vec3::X, bob, Vec3::ZERO).rope(1.0));
+    let bar = world.bodies.handle(3).expect("a bar");
+    world.insert_joint(Joint::new(bar, 0.25 * Vec3::X, bob, Vec3::ZERO).rope(1.0));
     let mut simulation = simulation(world, JointSolver::Direct);
     let stats = simulation.step(DT).expect("a step");
     assert_eq!((stats.direct_joints, stats.joints), (7, 7));
@@ -269,13 +270,14 @@ fn a_rope_is_solved_with_its_set() {
 fn polygon(corners: &[Vec3], closes: bool) -> World {
     let mut world = World::new();
     let count = corners.len() - usize::from(!closes);
-    let mut before = None;
+    let (mut first, mut before) = (None, None);
     for k in 0..count {
         let (from, to) = (corners[k], corners[(k + 1) % corners.len()]);
         let (middle, half) = (0.5 * (from + to), 0.5 * from.distance(to));
         let turn = Quat::from_rotation_arc(Vec3::X, (to - from).normalize());
         let bar = Body::dynamic().shape(Shape::cuboid(half, 0.05, 0.05)).rotation(turn);
         let bar = world.insert(bar.position(middle.x, middle.y, middle.z));
+        let first = *first.get_or_insert(bar);
         world.insert_joint(match before.replace((bar, half * Vec3::X)) {
             None => Joint::to_world(bar, -half * Vec3::X, from),
             Some((before, end)) => Joint::new(before, end, bar, -half * Vec3::X),
@@ -285,7 +287,7 @@ fn polygon(corners: &[Vec3], closes: bool) -> World {
                 world.insert_joint(Joint::new(
                     bar,
                     half * Vec3::X,
-                    0,
+                    first,
                     -0.5 * corners[0].distance(corners[1]) * Vec3::X,
                 ));
             } else {
@@ -344,22 +346,24 @@ fn rings_and_four_bar_linkages_of_hinges_stay_together() {
 
 fn a_tree_with_branches_stays_together() {
     // Every bar bears two more; the leaves are 500 times as heavy.
-    let mut world = World::new();
+    let (mut world, mut bars) = (World::new(), Vec::<BodyHandle>::new());
     for k in 0..31 {
         let depth = (k + 1_usize).ilog2();
         let place = (k + 1 - (1 << depth)) as f32 - 0.5 * ((1 << depth) - 1) as f32;
         let x = place * 16.0 / (1 << depth) as f32;
         let bar = Body::dynamic().shape(Shape::cuboid(0.05, 0.5, 0.05));
         let mass = if depth == 4 { 500.0 } else { 1.0 } * bar.mass.mass;
-        let index = world.insert(bar.total_mass(mass).position(x, -(depth as f32), 0.0));
+        let bar = world.insert(bar.total_mass(mass).position(x, -(depth as f32), 0.0));
         world.insert_joint(match k.checked_sub(1) {
-            None => Joint::to_world(index, 0.5 * Vec3::Y, Vec3::new(x, 0.5, 0.0)),
+            None => Joint::to_world(bar, 0.5 * Vec3::Y, Vec3::new(x, 0.5, 0.0)),
             Some(k) => {
-                let above = world.bodies[k / 2].position;
-                Joint::new(k / 2, Vec3::new(x - above.x, -0.5, 0.0), index, 0.5 * Vec3::Y)
+                let above = bars[k / 2];
+                let from = world.bodies[above].position.x;
+                Joint::new(above, Vec3::new(x - from, -0.5, 0.0), bar, 0.5 * Vec3::Y)
             }
         });
-        world.bodies[index].linear_velocity = Vec3::new(0.0, 0.0, 0.2 * depth as f32);
+        world.bodies[bar].linear_velocity = Vec3::new(0.0, 0.0, 0.2 * depth as f32);
+        bars.push(bar);
     }
     let [direct, swept] = [JointSolver::Auto, JointSolver::Sweeps].map(|solver| {
         let mut simulation = simulation(world.clone(), solver);
@@ -370,21 +374,22 @@ fn a_tree_with_branches_stays_together() {
 }
 
 fn a_sheet_in_a_plane_stays_together_though_its_loops_hold_it_twice() {
-    let mut world = World::new();
+    let (mut world, mut balls) = (World::new(), Vec::new());
     let n = 6;
     for i in 0..n * n {
         let (column, row) = (i % n, i / n);
         let place = 0.5 * Vec3::new(column as f32, 0.0, row as f32);
-        world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(place.x, place.y, place.z));
+        let ball = world.insert(Body::dynamic().shape(Shape::ball(0.2)).position(place.x, place.y, place.z));
         if column > 0 {
-            world.insert_joint(Joint::new(i - 1, 0.25 * Vec3::X, i, -0.25 * Vec3::X));
+            world.insert_joint(Joint::new(balls[i - 1], 0.25 * Vec3::X, ball, -0.25 * Vec3::X));
         }
         if row > 0 {
-            world.insert_joint(Joint::new(i - n, 0.25 * Vec3::Z, i, -0.25 * Vec3::Z));
+            world.insert_joint(Joint::new(balls[i - n], 0.25 * Vec3::Z, ball, -0.25 * Vec3::Z));
         }
         if [0, n - 1].contains(&column) && [0, n - 1].contains(&row) {
-            world.insert_joint(Joint::to_world(i, Vec3::ZERO, place));
+            world.insert_joint(Joint::to_world(ball, Vec3::ZERO, place));
         }
+        balls.push(ball);
     }
     let middle = n * n / 2 + n / 2;
     world.bodies[middle] = world.bodies[middle].clone().total_mass(300.0 * world.bodies[0].mass.mass);
@@ -401,10 +406,11 @@ fn a_ball_of_next_to_no_inertia_at_a_long_arm_stays_where_it_is_tied() {
     let mut gaps: Vec<f32> = (0..9)
         .map(|k| {
             let mut world = chain(5, 10.0);
-            let end = world.bodies[5].position;
-            let ball = Body::dynamic().shape(Shape::ball(0.001)).position(end.x + 1.0, end.y, end.z);
+            let end = world.bodies.handle(5).expect("the end");
+            let at = world.bodies[end].position;
+            let ball = Body::dynamic().shape(Shape::ball(0.001)).position(at.x + 1.0, at.y, at.z);
             let ball = world.insert(ball.velocity(k as f32 * 1e-4 * Vec3::Z, Vec3::ZERO));
-            world.insert_joint(Joint::new(5, Vec3::ZERO, ball, -Vec3::X));
+            world.insert_joint(Joint::new(end, Vec3::ZERO, ball, -Vec3::X));
             let mut simulation = simulation(world, JointSolver::Direct);
             let gap = largest_gap(&mut simulation, 600);
             assert!(simulation.world.first_non_finite().is_none());
@@ -459,17 +465,17 @@ fn the_setting_chooses_and_the_statistics_tell() {
 fn lanes_and_threads_have_the_bits_of_the_reference() {
     let mut world = World::new();
     for lane in 0..5 {
-        let first = world.bodies.len();
         let own = chain(10 + 7 * lane, 200.0);
-        for body in own.bodies {
+        let insert = |body: Body| {
             let Vec3 { x, y, .. } = body.position;
-            world.insert(body.position(x, y, 3.0 * lane as f32));
-        }
+            world.insert(body.position(x, y, 3.0 * lane as f32))
+        };
+        let links: Vec<BodyHandle> = own.bodies.into_iter().map(insert).collect();
         for (k, &joint) in own.joints.iter().enumerate() {
-            let a = first + joint.body_a.index();
+            let a = links[joint.body_a.index()];
             let tie = match joint.body_b {
                 None => Joint::to_world(a, joint.anchor_a, Vec3::new(0.0, 0.0, 3.0 * lane as f32)),
-                Some(b) => Joint::new(a, joint.anchor_a, first + b.index(), joint.anchor_b),
+                Some(b) => Joint::new(a, joint.anchor_a, links[b.index()], joint.anchor_b),
             };
             // The last chains have joints of other kinds between the balls.
             world.insert_joint(match (lane, k % 5) {

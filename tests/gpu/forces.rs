@@ -212,10 +212,11 @@ fn mixture() -> World {
             body.torque = Vec3::new(0.3, 1.0, -0.2) * torque;
             world.insert(body);
         }
-        world.insert(Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).position(3.0, 2.0, 0.0).gravity_scale(-0.1));
-        world.insert(Body::dynamic().shape(Shape::ball(0.3)).position(3.0, 4.0, 0.0));
-        world.bodies[5].torque = Vec3::ONE * 0.3 * torque;
-        world.insert_joint(Joint::new(5, Vec3::Y, 6, Vec3::NEG_Y));
+        let plank = Body::dynamic().shape(Shape::cuboid(0.5, 0.1, 0.2)).position(3.0, 2.0, 0.0).gravity_scale(-0.1);
+        let plank = world.insert(plank);
+        let ball = world.insert(Body::dynamic().shape(Shape::ball(0.3)).position(3.0, 4.0, 0.0));
+        world.bodies[plank].torque = Vec3::ONE * 0.3 * torque;
+        world.insert_joint(Joint::new(plank, Vec3::Y, ball, Vec3::NEG_Y));
         world
     };
     let mut all = world(Vec3::Y * -9.81, 0.0);
@@ -264,11 +265,9 @@ fn a_world_is_the_same_alone_and_beside_one_of_other_gravity() {
     for (part, own) in all.worlds().into_iter().enumerate().skip(1) {
         let own: Vec<usize> = own.into_iter().map(BodyHandle::index).collect();
         let mut alone = World { gravity: all.gravity_of(part), ..World::new() };
-        for &i in &own {
-            alone.insert(all.bodies[i].clone());
-        }
+        let bodies: Vec<BodyHandle> = own.iter().map(|&i| alone.insert(all.bodies[i].clone())).collect();
         let first = own[0];
-        alone.insert_joint(Joint::new(5, Vec3::Y, 6, Vec3::NEG_Y));
+        alone.insert_joint(Joint::new(bodies[5], Vec3::Y, bodies[6], Vec3::NEG_Y));
         let mut simulation = simulation(alone, reference);
         run(&mut simulation, 40);
         assert_eq!(bits(&simulation.world, 0..own.len()), bits(&beside, own), "world {part} from {first} on");
@@ -312,8 +311,8 @@ fn sleepers(gravity: f32) -> World {
 
 fn asleep(world: World) -> Simulation {
     let mut simulation = simulation(world, reference);
-    let dynamic: Vec<usize> =
-        (0..simulation.world.bodies.len()).filter(|&i| simulation.world.bodies[i].mass.mass > 0.0).collect();
+    let bodies = &simulation.world.bodies;
+    let dynamic: Vec<BodyHandle> = bodies.handles().filter(|&i| bodies[i].mass.mass > 0.0).collect();
     while !dynamic.iter().all(|&i| simulation.is_asleep(i)) {
         run(&mut simulation, 1);
     }
@@ -335,11 +334,12 @@ fn every_change_of_a_load_wakes_a_body_that_sleeps() {
     for (name, change) in changes {
         let mut simulation = asleep(sleepers(9.81));
         run(&mut simulation, 1);
-        assert!(simulation.is_asleep(1), "{name}: woke without a change");
-        change(&mut simulation.world.bodies[1]);
+        let [changed, other] = [1, 2].map(|i| simulation.world.bodies.handle(i).expect("a cube"));
+        assert!(simulation.is_asleep(changed), "{name}: woke without a change");
+        change(&mut simulation.world.bodies[changed]);
         run(&mut simulation, 1);
-        assert!(!simulation.is_asleep(1) && simulation.is_asleep(2), "{name}");
-        let body = &simulation.world.bodies[1];
+        assert!(!simulation.is_asleep(changed) && simulation.is_asleep(other), "{name}");
+        let body = &simulation.world.bodies[changed];
         assert_eq!((body.whole_force(), body.whole_torque()), (body.force, body.torque), "{name}");
     }
 }
@@ -350,7 +350,8 @@ fn gravity_of_one_world_wakes_its_bodies_and_no_others() {
     let mut simulation = asleep(world);
     simulation.world.own_gravity[1] = Some(Vec3::Y * -3.7);
     run(&mut simulation, 1);
-    assert_eq!([1, 2, 4, 5].map(|i| simulation.is_asleep(i)), [true, true, false, false]);
+    let cubes = [1, 2, 4, 5].map(|i| simulation.world.bodies.handle(i).expect("a cube"));
+    assert_eq!(cubes.map(|cube| simulation.is_asleep(cube)), [true, true, false, false]);
 }
 
 /// Kinetic and potential energy of bodies that fall, rise and float in two worlds, against their sum at the start.
@@ -397,12 +398,10 @@ fn joints_bear_the_gravity_that_their_bodies_feel() {
         if let Some(own) = own {
             world.own_gravity = vec![Some(Vec3::Y * -own)];
         }
-        for k in 0..3 {
-            world.insert(cube().position(0.0, -2.0 * k as f32, 0.0).gravity_scale(scale));
-        }
-        world.insert_joint(Joint::to_world(0, Vec3::Y, Vec3::Y));
-        world.insert_joint(Joint::new(0, Vec3::NEG_Y, 1, Vec3::Y));
-        world.insert_joint(Joint::new(1, Vec3::NEG_Y, 2, Vec3::Y));
+        let [a, b, c] = [0.0, -2.0, -4.0].map(|y| world.insert(cube().position(0.0, y, 0.0).gravity_scale(scale)));
+        world.insert_joint(Joint::to_world(a, Vec3::Y, Vec3::Y));
+        world.insert_joint(Joint::new(a, Vec3::NEG_Y, b, Vec3::Y));
+        world.insert_joint(Joint::new(b, Vec3::NEG_Y, c, Vec3::Y));
         let mut simulation = simulation(world, reference);
         let first = simulation.step(DT).expect("a step").swept_joint_gap;
         // A change between steps counts as well.

@@ -121,7 +121,8 @@ fn a_rod_on_a_hinge_that_is_pushed_on_its_tip_gains_no_energy() {
             let carriage = Body::dynamic().shape(Shape::cuboid(0.2, 0.2, 0.2)).locked_translations([false, true, true]);
             let carriage = carriage.locked_rotations([true; 3]).position(top.x, top.y, 0.0);
             let carriage = world.insert(carriage.velocity(5.0 * way * Vec3::X, Vec3::ZERO));
-            world.insert_joint(Joint::new(1, Vec3::Y, carriage, Vec3::ZERO).hinge(Vec3::Z));
+            let rod = world.bodies.handle(1).expect("a rod");
+            world.insert_joint(Joint::new(rod, Vec3::Y, carriage, Vec3::ZERO).hinge(Vec3::Z));
             let [most, left] = gained(world, substeps, Box::new(Cpu::new()));
             let what = format!("mu {mu}, way {way}, {substeps} substeps");
             measured!("{what}: {most:.1e}, {left:.2} left");

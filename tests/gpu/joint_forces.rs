@@ -134,7 +134,7 @@ fn forces_change_no_bit_and_sleep_with_their_bodies() {
     for simulation in &mut each {
         simulation.world.insert(Body::dynamic().shape(Shape::ball(0.1)).position(5.0, 0.0, 0.0));
         simulation.step(DT).expect("a step");
-        assert!(simulation.is_asleep(0));
+        assert!(simulation.is_asleep(simulation.world.bodies.handle(0).expect("a link")));
         let force = simulation.joint_force(joints[0]).expect("a step ran");
         assert!((force + 3.0 * G * Vec3::Y).length() < 0.01 * G, "{force} N");
     }

@@ -118,13 +118,14 @@ fn a_hinge_about_any_axis_of_a_joint_turns_on_with_its_load(open: Open) {
         let frame = Quat::from_rotation_arc(Vec3::AXES[free], Vec3::Z);
         let mut angular = [Axis::LOCKED; 3];
         angular[free] = Axis::FREE;
+        let mut before = None;
         for i in 0..COUNT {
             let center = Vec3::X * (0.5 + i as f32);
             let rod = Body::dynamic().shape(Shape::cuboid(0.5, 0.05, 0.05)).position(center.x, 0.0, 0.0);
             let rod = world.insert(rod.velocity((Vec3::Z * 6.0).cross(center), Vec3::Z * 6.0));
-            let joint = match i {
-                0 => Joint::to_world(rod, Vec3::X * -0.5, Vec3::ZERO),
-                _ => Joint::new(rod, Vec3::X * -0.5, i - 1, Vec3::X * 0.5),
+            let joint = match before.replace(rod) {
+                None => Joint::to_world(rod, Vec3::X * -0.5, Vec3::ZERO),
+                Some(before) => Joint::new(rod, Vec3::X * -0.5, before, Vec3::X * 0.5),
             };
             world.insert_joint(Joint { frame_a: frame, frame_b: frame, ..joint.generic([Axis::LOCKED; 3], angular) });
         }

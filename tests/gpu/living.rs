@@ -73,7 +73,7 @@ fn a_body_that_goes_lets_fall_what_lay_on_it_and_nothing_else(open: Open) {
         let mut unchanged = simulation(&world, &config, open);
         run(&mut changed, 120);
         run(&mut unchanged, 120);
-        assert_eq!(changed.is_asleep(towers[0][0].index()), config.sleep_after > 0.0);
+        assert_eq!(changed.is_asleep(towers[0][0]), config.sleep_after > 0.0);
         let lowest = changed.world.remove(towers[1][0]).expect("a cube");
         assert!((lowest.position.y - 0.5).abs() < 1e-3);
         for step in 0..90 {
@@ -95,12 +95,12 @@ fn a_body_that_comes_lands_and_rests_on_what_sleeps(open: Open) {
     let (world, towers) = towers(2);
     let mut simulation = simulation(&world, &SolverConfig::default(), open);
     run(&mut simulation, 120);
-    assert!(simulation.is_asleep(towers[0][0].index()));
+    assert!(simulation.is_asleep(towers[0][0]));
     let new = simulation.world.insert(cube(0.0, 7.0));
     run(&mut simulation, 240);
     let landed = simulation.world.body(new).expect("the cube").position;
     assert!((landed.y - 5.5).abs() < 2e-3 && landed.x.abs() < 0.02, "{landed}");
-    assert!(simulation.is_asleep(new.index()));
+    assert!(simulation.is_asleep(new));
     assert!(simulation.manifolds().any(|m| [m.a.body, m.b.body].contains(&new)));
 }
 

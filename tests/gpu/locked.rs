@@ -4,7 +4,7 @@ use crate::common::state::{all_bits, reference};
 use crate::common::{Open, gpu};
 use drystone::config::JointSolver;
 use drystone::glam::{DVec3, Mat3, Quat, Vec3};
-use drystone::{Body, Cpu, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Cpu, Joint, MassProperties, Shape, Simulation, SolverConfig, World};
 
 tests! {
     every_backend {
@@ -229,16 +229,17 @@ fn a_contact_problem_of_locked_bodies_is_refused_by_name() {
 fn plane(joints: bool) -> World {
     let mut world = World::new();
     world.insert(Body::fixed().shape(Shape::half_space(Vec3::new(0.0, 1.0, 0.2).normalize())));
-    for k in 0..12 {
+    let insert = |k: i32| {
         let at = [1.5 * (k % 4) as f32, 0.8 + 1.6 * (k / 4) as f32, 0.02 * k as f32];
         let body = if k % 3 == 0 { Body::dynamic().shape(Shape::ball(0.4)) } else { cube() };
         let body = body.position(at[0], at[1], at[2]).rotation(Quat::from_rotation_z(0.2 * k as f32));
         let body = body.locked_translations([false, false, true]).locked_rotations([true, true, false]);
-        world.insert(body.velocity(Vec3::new(1.0, -1.0, 2.0), Vec3::ONE));
-    }
+        world.insert(body.velocity(Vec3::new(1.0, -1.0, 2.0), Vec3::ONE))
+    };
+    let bodies: Vec<BodyHandle> = (0..12).map(insert).collect();
     if joints {
-        for (a, b) in [(11, 12), (10, 11)] {
-            let [body_a, body_b] = [a, b].map(|i: usize| &world.bodies[i]);
+        for (a, b) in [(bodies[10], bodies[11]), (bodies[9], bodies[10])] {
+            let [body_a, body_b] = [a, b].map(|body| &world.bodies[body]);
             let middle = body_a.position.midpoint(body_b.position);
             let [on_a, on_b] = [body_a, body_b].map(|body| body.rotation.inverse() * (middle - body.position));
             world.insert_joint(Joint::new(a, on_a, b, on_b));
@@ -404,11 +405,11 @@ fn lanes_have_the_bits_of_the_reference_with_locked_translations() {
 /// give them a motion that they cannot have.
 fn the_law_of_energy_holds_bodies_with_locked_axes() {
     let mut world = weightless();
-    for k in 0..2 {
-        let body = cube().position(0.9 * k as f32, 0.0, 0.0).locked_translations([false, true, true]);
-        world.insert(body.velocity(Vec3::X * (3.0 - 6.0 * k as f32), Vec3::new(0.0, 5.0, -8.0)));
-    }
-    world.insert_joint(Joint::new(0, Vec3::X * 0.45, 1, Vec3::X * -0.45).colliding());
+    let [a, b] = [(0.0, 3.0), (0.9, -3.0)].map(|(x, speed)| {
+        let body = cube().position(x, 0.0, 0.0).locked_translations([false, true, true]);
+        world.insert(body.velocity(Vec3::X * speed, Vec3::new(0.0, 5.0, -8.0)))
+    });
+    world.insert_joint(Joint::new(a, Vec3::X * 0.45, b, Vec3::X * -0.45).colliding());
     let energy = |world: &World| world.bodies.iter().map(Body::kinetic_energy).sum::<f64>();
     let before = energy(&world);
     let mut simulation = Simulation::with(world, SolverConfig::default(), reference()).expect("a simulation");

@@ -3,7 +3,7 @@
 use crate::common::gpu;
 use crate::common::state::{all_bits, reference};
 use drystone::glam::{Quat, Vec3};
-use drystone::{Body, BodyHandle, Cpu, Shape, Simulation, SolvedManifold, SolverConfig, World};
+use drystone::{Body, Cpu, Shape, Simulation, SolvedManifold, SolverConfig, World};
 
 tests! {
     exact_gpu {
@@ -46,6 +46,11 @@ fn settled(world: World, config: SolverConfig) -> Simulation {
     simulation
 }
 
+/// Whether all of these bodies sleep.
+fn asleep(simulation: &Simulation, bodies: std::ops::Range<usize>) -> bool {
+    bodies.into_iter().all(|i| simulation.is_asleep(simulation.world.bodies.handle(i).expect("a body")))
+}
+
 fn awake(heights: &[usize]) -> Simulation {
     settled(towers(heights), SolverConfig::default().without_sleep())
 }
@@ -67,7 +72,7 @@ fn fastest(simulation: &mut Simulation, steps: u32, bodies: &[usize]) -> f32 {
 
 /// The force that presses two bodies together in the last substep, in weights of a cube.
 fn weights(simulation: &mut Simulation, pair: [usize; 2]) -> f32 {
-    let pair = pair.map(BodyHandle::from);
+    let pair = pair.map(|i| simulation.world.bodies.handle(i).expect("a body"));
     let is_of = |m: &SolvedManifold| [m.a.body, m.b.body] == pair || [m.b.body, m.a.body] == pair;
     simulation.manifolds().filter(is_of).map(|m| m.normal_impulse() * m.substeps as f32 / (9810.0 * DT)).sum()
 }
@@ -184,19 +189,19 @@ fn a_platform_that_the_caller_moves_little_by_little_keeps_impulses() {
 
 fn a_sleeping_box_that_is_put_into_the_air_falls() {
     let mut simulation = settled(towers(&[3, 3]), SolverConfig::default());
-    assert!((1..7).all(|i| simulation.is_asleep(i)));
+    assert!(asleep(&simulation, 1..7));
     simulation.world.bodies[3].position.y += 4.0;
     run(&mut simulation, 10);
     let expected = -9.81 * 10.0 * DT;
     let top = &simulation.world.bodies[3];
     assert!((top.linear_velocity.y - expected).abs() < 1e-4, "{}", top.linear_velocity);
     assert!((1..3).all(|i| simulation.world.bodies[i].linear_velocity.length() < 2e-3));
-    assert!((4..7).all(|i| simulation.is_asleep(i)));
+    assert!(asleep(&simulation, 4..7));
 }
 
 fn a_sleeping_pile_falls_when_its_lowest_box_is_put_elsewhere() {
     let mut simulation = settled(towers(&[5]), SolverConfig::default());
-    assert!((1..6).all(|i| simulation.is_asleep(i)));
+    assert!(asleep(&simulation, 1..6));
     simulation.world.bodies[1].position.x = 20.0;
     let fastest = fastest(&mut simulation, 10, &[1]);
     assert!(fastest < 2e-3, "{fastest} m/s");

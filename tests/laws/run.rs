@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use drystone::glam::DVec3;
-use drystone::{Backend, BodyKind, Cpu, Listen, Simulation, SolverConfig, World};
+use drystone::{Backend, BodyHandle, BodyKind, Cpu, Listen, Simulation, SolverConfig, World};
 use drystone_scenes::Scene;
 
 use super::measures::{Gap, Mechanics, Springs, is_alone, size};
@@ -348,8 +348,8 @@ pub fn run_on(case: &Case, backend: Box<dyn Backend>, traces: bool) -> Verdict {
     let power = motor_power(&simulation.world);
     let weight: f64 =
         simulation.world.dynamic().map(|b| f64::from(b.mass.mass) * size(b)).sum::<f64>() * gravity.length().max(1.0);
-    let dynamic: Vec<usize> =
-        (0..simulation.world.bodies.len()).filter(|&i| simulation.world.bodies[i].kind == BodyKind::Dynamic).collect();
+    let bodies = &simulation.world.bodies;
+    let dynamic: Vec<BodyHandle> = bodies.handles().filter(|&i| bodies[i].kind == BodyKind::Dynamic).collect();
     let (mut before, springs_at_start) = (Mechanics::of(&simulation.world), Springs::of(&simulation.world));
     let start = before;
     let motion = |m: &Mechanics| if alone { m.kinetic - m.common } else { m.kinetic };

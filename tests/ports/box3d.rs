@@ -376,7 +376,7 @@ fn stack_at(x: f32) -> (Vec<Vec3>, bool) {
     let mut simulation = started(world);
     run(&mut simulation, 400);
     let places = boxes.iter().map(|&handle| place(&simulation, handle) - x * Vec3::X).collect();
-    (places, boxes.iter().all(|handle| simulation.is_asleep(handle.index())))
+    (places, boxes.iter().all(|&handle| simulation.is_asleep(handle)))
 }
 
 /// Box3D, test_large_world: LargeWorldStackTest, as far as single precision goes: heights, because boxes that fall flat
@@ -807,7 +807,7 @@ fn stack(count: usize, pitch: f32, first: f32, gap: f32, steps: usize, of: impl 
         place(&simulation, *handle).distance((0.5 * pitch + pitch * i as f32) * Vec3::Y)
     };
     let worst = bodies.iter().enumerate().map(off).fold(0.0, f32::max);
-    (worst, bodies.iter().all(|handle| simulation.is_asleep(handle.index())))
+    (worst, bodies.iter().all(|&handle| simulation.is_asleep(handle)))
 }
 
 /// Box3D, Stacking: Sphere Stack, with its rolling resistance.
@@ -1263,7 +1263,7 @@ fn a_weeble_stands_up_and_comes_to_rest() {
     let up = (body(&simulation, weeble).rotation * Vec3::Y).y;
     // It rests where the lever of its weight, half a meter times the sine of its tilt, is that of rolling friction.
     assert!(up > (1.0_f32 - 0.2 * 0.2).sqrt() - 1e-3, "{up}");
-    assert!(simulation.is_asleep(weeble.index()));
+    assert!(simulation.is_asleep(weeble));
 }
 
 /// Box3D, Bodies: Lock Mixing.

@@ -47,7 +47,7 @@ fn way(speed: f32, acceleration: f32, time: f32) -> f32 {
 }
 
 fn asleep(simulation: &Simulation, handle: BodyHandle) -> bool {
-    simulation.is_asleep(handle.index())
+    simulation.is_asleep(handle)
 }
 
 // PhysicsTests
@@ -785,8 +785,8 @@ fn a_body_on_a_slider_sleeps_and_wakes_with_the_other() {
         assert!(asleep(&simulation, second), "{kind:?}");
         match kind {
             BodyKind::Kinematic => body_mut(&mut simulation, first).linear_velocity = Vec3::Y,
-            BodyKind::Dynamic => simulation.wake(first.index()),
-            _ => simulation.wake(second.index()),
+            BodyKind::Dynamic => simulation.wake(first),
+            _ => simulation.wake(second),
         }
         run(&mut simulation, 1);
         assert!(!asleep(&simulation, second), "{kind:?}");
@@ -1302,7 +1302,7 @@ fn a_sensor_detects_a_sleeping_body_and_does_not_wake_it() {
         simulation.world.insert(sensor);
         assert_eq!(visits(&mut simulation, 1), [(true, sleeper, 0)]);
         assert!(asleep(&simulation, sleeper));
-        simulation.wake(sleeper.index());
+        simulation.wake(sleeper);
         assert_eq!(visits(&mut simulation, 60), []);
         assert!(asleep(&simulation, sleeper) && simulation.overlaps().len() == 1);
     }

@@ -1131,13 +1131,13 @@ fn a_rider_wakes_with_its_platform_and_sleeps_again() {
     let rider = world.insert(light().shape(cube(0.5)).position(0.0, 3.3, 0.0));
     let mut simulation = started(world);
     run(&mut simulation, 500);
-    assert!(simulation.is_asleep(rider.index()));
+    assert!(simulation.is_asleep(rider));
     body_mut(&mut simulation, slow).linear_velocity = Vec3::Y * 0.01;
     for step in 500..1000 {
         let t = step as f32 * DT;
         body_mut(&mut simulation, lift).linear_velocity = vec3(0.0, (2.0 * t).cos(), 0.5 * t.sin());
         run(&mut simulation, 1);
-        assert!(!simulation.is_asleep(rider.index()), "step {step}");
+        assert!(!simulation.is_asleep(rider), "step {step}");
         let above = place(&simulation, rider).y - place(&simulation, lift).y - 1.0;
         // The platform falls away at 0.57 m/s at first.
         let most = if step < 530 { 0.5 * 0.58 * 0.58 / G } else { 1e-3 };
@@ -1149,7 +1149,7 @@ fn a_rider_wakes_with_its_platform_and_sleeps_again() {
         body_mut(&mut simulation, plate).linear_velocity = Vec3::ZERO;
     }
     run(&mut simulation, 500);
-    assert!(simulation.is_asleep(rider.index()));
+    assert!(simulation.is_asleep(rider));
 }
 
 /// Rapier, debug_disabled3, by groups: a shape has no switch.

@@ -56,7 +56,7 @@ fn the_seam_of_two_height_fields_has_no_bump() {
 /// Steps until a body sleeps, at most 2,000.
 fn steps_to_sleep(simulation: &mut Simulation, handle: BodyHandle) -> usize {
     let mut steps = 0;
-    while !simulation.is_asleep(handle.index()) && steps < 2000 {
+    while !simulation.is_asleep(handle) && steps < 2000 {
         run(simulation, 1);
         steps += 1;
     }
@@ -78,7 +78,7 @@ fn a_kinematic_body_wakes_the_sleeper_on_its_hinge() {
         x += 0.05;
         body_mut(&mut simulation, hand).move_to(Vec3::X * x, Quat::IDENTITY, DT);
         run(&mut simulation, 1);
-        woke |= !simulation.is_asleep(load.index());
+        woke |= !simulation.is_asleep(load);
     }
     let end = place(&simulation, load).x;
     assert!(woke && (end - x).abs() < 2.0, "at {end} m, the hand at {x} m");

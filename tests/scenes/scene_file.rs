@@ -434,7 +434,8 @@ fn a_cone_of_a_file_holds_the_axis_of_the_world() {
     };
     let scene = read("0.5").expect("a scene");
     let anchor = Vec3::Y;
-    let cone = Joint::to_world(0, anchor, anchor).along(Vec3::X).in_world(&scene.world).cone(0.5);
+    let arm = scene.world.bodies.handle(0).expect("the arm");
+    let cone = Joint::to_world(arm, anchor, anchor).along(Vec3::X).in_world(&scene.world).cone(0.5);
     let joint = scene.world.joints[0];
     assert!(
         joint.anchor_a.distance(cone.anchor_a) < 1e-6 && joint.anchor_b.distance(cone.anchor_b) < 1e-6,

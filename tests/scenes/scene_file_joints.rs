@@ -31,10 +31,12 @@ fn refusal(joint: Value) -> String {
 
 #[test]
 fn a_body_is_named_by_name_or_by_index() {
-    let joint = one_joint(json!({"type": "ball", "bodies": ["a", 2], "anchors": [[1, 0, 0], [0, 1, 0]]}));
-    assert_eq!(joint, Joint::new(1, Vec3::X, 2, Vec3::Y));
+    let scene = read(&json!({"type": "ball", "bodies": ["a", 2], "anchors": [[1, 0, 0], [0, 1, 0]]}));
+    let world = scene.expect("a good scene").world;
+    let [a, twin] = [1, 2].map(|i| world.bodies.handle(i).expect("a ball"));
+    assert_eq!(world.joints[0], Joint::new(a, Vec3::X, twin, Vec3::Y));
     let joint = one_joint(json!({"type": "ball", "bodies": ["a"], "anchors": [[1, 0, 0], [4, 5, 6]]}));
-    assert_eq!(joint, Joint::to_world(1, Vec3::X, Vec3::new(4.0, 5.0, 6.0)));
+    assert_eq!(joint, Joint::to_world(a, Vec3::X, Vec3::new(4.0, 5.0, 6.0)));
 }
 
 #[test]

@@ -116,11 +116,12 @@ mod tests {
     /// A row of `count` cubes, 1 m apart. The last one is `away` (m) from its place, and a rope ties it to its place.
     fn row(count: usize, away: f32) -> World {
         let mut world = World::new();
-        for i in 0..count {
+        let cubes = (0..count).map(|i| {
             let x = i as f32 + if i + 1 == count { away } else { 0.0 };
-            world.insert(Body::dynamic().shape(Shape::cuboid(0.4, 0.4, 0.4)).position(x, 0.0, 0.0));
-        }
-        world.insert_joint(Joint::to_world(count - 1, Vec3::ZERO, Vec3::X * (count as f32 - 1.0)).rope(1e9));
+            world.insert(Body::dynamic().shape(Shape::cuboid(0.4, 0.4, 0.4)).position(x, 0.0, 0.0))
+        });
+        let last = cubes.last().expect("a cube");
+        world.insert_joint(Joint::to_world(last, Vec3::ZERO, Vec3::X * (count as f32 - 1.0)).rope(1e9));
         world
     }
 

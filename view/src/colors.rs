@@ -257,7 +257,7 @@ mod tests {
         let mut stack = settled("stack", &["n=2".into()]);
         let before = ColorBy::Sleeping.values(&mut stack);
         assert_eq!(before, [0.0, 1.0, 1.0]);
-        stack.wake(2);
+        stack.wake(stack.world.bodies.handle(2).expect("a cube"));
         let after = ColorBy::Sleeping.values(&mut stack);
         assert_eq!(after, [0.0; 3]);
         let light = |values: &[f32]| ColorBy::Sleeping.paint(&stack.world, values, 1.0)[1][0];

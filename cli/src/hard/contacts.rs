@@ -53,7 +53,8 @@ pub(super) fn held(setup: &Setup, checks: &mut Checks) -> Result<()> {
         let mut simulation = setup.sleeping(Scene::find_spec(&format!("press:depth={depth}"))?.world)?;
         let fastest = largest(LEAST, watch(&mut simulation, 600, largest_speed)?);
         checks.at_most(format!("{depth} m deep: largest speed [m/s]"), fastest, 0.5);
-        let crate_ = simulation.world.bodies.iter().position(|body| body.name == "crate").expect("a crate");
+        let bodies = &simulation.world.bodies;
+        let crate_ = bodies.handles().find(|&body| bodies[body].name == "crate").expect("a crate");
         let substeps = simulation.substeps_of(crate_) / setup.config.substeps;
         checks.at_most(format!("{depth} m deep: substeps, over those of the settings"), substeps.into(), 1.0);
         let is_awake = !simulation.is_asleep(crate_);

@@ -99,7 +99,7 @@ pub(super) fn bridge(planks: usize, boxes: usize) -> Scene {
 /// mass of the others.
 pub(super) fn grid(n: usize, ratio: f32) -> Scene {
     const PITCH: f32 = 0.5;
-    let mut world = World::new();
+    let (mut world, mut balls) = (World::new(), Vec::new());
     let ball = |density: f32| Body::dynamic().shape(Shape::ball(0.2)).density(density);
     let heavy = (n - 1) * n + n / 2;
     let (to_x, to_z) = (0.5 * PITCH * Vec3::X, 0.5 * PITCH * Vec3::Z);
@@ -107,14 +107,15 @@ pub(super) fn grid(n: usize, ratio: f32) -> Scene {
         let (column, row) = (i % n, i / n);
         let place = Vec3::new((centered(column, n) * f64::from(PITCH)) as f32, 0.0, PITCH * (row as f32 + 0.5));
         let density = if i == heavy { 1000.0 * ratio } else { 1000.0 };
-        world.insert(ball(density).position(place.x, place.y, place.z));
+        let ball = world.insert(ball(density).position(place.x, place.y, place.z));
         if column > 0 {
-            world.insert_joint(Joint::new(i - 1, to_x, i, -to_x));
+            world.insert_joint(Joint::new(balls[i - 1], to_x, ball, -to_x));
         }
         world.insert_joint(match i.checked_sub(n) {
-            None => Joint::to_world(i, -to_z, place - to_z),
-            Some(above) => Joint::new(above, to_z, i, -to_z),
+            None => Joint::to_world(ball, -to_z, place - to_z),
+            Some(above) => Joint::new(balls[above], to_z, ball, -to_z),
         });
+        balls.push(ball);
     }
     Scene::new("joint-grid", world, 600)
 }

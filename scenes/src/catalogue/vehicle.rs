@@ -38,8 +38,7 @@ pub(super) fn vehicle(speed: f32, degrees: f32, hills: f32, load: f32, mu: f32) 
     if load > 0.0 {
         chassis = chassis.additional_mass(MassProperties::point(load, Vec3::ZERO));
     }
-    let driven = world.insert(chassis.position(0.0, HEIGHT, 0.0));
-    let chassis = driven.index();
+    let chassis = world.insert(chassis.position(0.0, HEIGHT, 0.0));
     let omega = TAU * RIDE.0;
     let sag = 9.81 / (omega * omega);
     let (stiffness, damping) = (0.25 * CHASSIS * omega * omega, 0.5 * CHASSIS * omega * RIDE.1);
@@ -55,7 +54,7 @@ pub(super) fn vehicle(speed: f32, degrees: f32, hills: f32, load: f32, mu: f32) 
         let spin = Axis::FREE.motor(-speed / RADIUS, TORQUE);
         world.insert_joint(joint.generic([Axis::LOCKED, spring, Axis::LOCKED], [spin, steer, Axis::LOCKED]));
     }
-    Ok(Scene { driver: Some(Driver::vehicle(driven)), ..Scene::new("vehicle", world, 600) })
+    Ok(Scene { driver: Some(Driver::vehicle(chassis)), ..Scene::new("vehicle", world, 600) })
 }
 
 /// Rows of heights (m), level around the start.

@@ -24,16 +24,18 @@ impl BodyRef {
     /// The body in `world`.
     pub(super) fn find(&self, world: &World) -> Result<BodyHandle> {
         let count = world.bodies.len();
-        let handle = |i: usize| world.bodies.handle(i).unwrap_or(i.into());
         match self {
-            Self::Index(index) if *index < count => Ok(handle(*index)),
-            Self::Index(index) => Err(input!("body {index}: must be less than {count}, the number of bodies")),
+            Self::Index(index) => {
+                let body = world.bodies.handle(*index);
+                body.ok_or_else(|| input!("body {index}: must be less than {count}, the number of bodies"))
+            }
             Self::Name(name) => {
-                let mut named = (0..count).filter(|&i| world.bodies[i].name == *name);
+                let mut named = world.bodies.handles().filter(|&body| world.bodies[body].name == *name);
                 match (named.next(), named.next()) {
-                    (Some(index), None) => Ok(handle(index)),
+                    (Some(body), None) => Ok(body),
                     (None, _) => Err(input!("body {name:?}: no body has that name")),
                     (Some(a), Some(b)) => {
+                        let [a, b] = [a, b].map(BodyHandle::index);
                         Err(input!("body {name:?}: bodies {a} and {b} have that name; give an index"))
                     }
                 }

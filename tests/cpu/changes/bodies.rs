@@ -1,5 +1,6 @@
 //! Masses, materials and numbers of bodies that change, and changes that are refused.
 
+use crate::common::state::handle;
 use drystone::glam::{Quat, Vec3};
 use drystone::{Body, Joint, Shape, Simulation, SolvedManifold, SolverConfig, World};
 use drystone_conform::compare::Difference;
@@ -11,7 +12,7 @@ fn masses_and_materials_may_change() {
     let mut simulation =
         simulation(&standing(), &SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3), cpu);
     run(&mut simulation, 240);
-    let (slope, block) = (16, 17);
+    let [slope, block] = [16, 17].map(|i| simulation.world.bodies.handle(i).expect("a body"));
     assert!(simulation.is_asleep(block));
     // The slope becomes ice, though what lies on it sleeps.
     simulation.world.bodies[slope].material.friction = 0.0;
@@ -46,10 +47,11 @@ fn a_wrong_body_that_came_or_changed_is_refused_in_one_line() {
         }),
         ("body 0 \"\": mass", |w| w.bodies[0].kind = drystone::BodyKind::Dynamic),
         ("joint 5: names body 5, which was removed", |w| {
-            w.joints[0].body_a = 5.into();
-            w.remove(w.bodies.handle(5).expect("a body"));
-            w.insert_joint(Joint::to_world(4, Vec3::ZERO, Vec3::ZERO));
-            w.joints[5].body_a = 5.into();
+            let [below, top] = [4, 5].map(|i| w.bodies.handle(i).expect("a cube"));
+            w.joints[0].body_a = top;
+            w.remove(top);
+            w.insert_joint(Joint::to_world(below, Vec3::ZERO, Vec3::ZERO));
+            w.joints[5].body_a = top;
         }),
     ];
     for (start, change) in cases {
@@ -90,8 +92,10 @@ fn a_step_of_no_length_is_refused_and_leaves_the_world_as_it_was() {
 fn a_wrong_joint_or_mass_between_steps_is_refused_by_name() {
     let cases: [(&str, Change); 6] = [
         ("gravity", |w| w.gravity.y = f32::NAN),
-        ("joint 0: names body 99, beyond the last of ", |w| w.joints[0].body_b = Some(99.into())),
-        ("joint 0: connects body 1 to itself", |w| w.joints[0] = Joint::new(1, Vec3::ZERO, 1, Vec3::ZERO)),
+        ("joint 0: names body 99, beyond the last of ", |w| w.joints[0].body_b = Some(handle(99))),
+        ("joint 0: connects body 1 to itself", |w| {
+            w.joints[0] = Joint::new(handle(1), Vec3::ZERO, handle(1), Vec3::ZERO)
+        }),
         ("joint 0: its anchors", |w| w.joints[0].anchor_b.x = f32::NAN),
         ("body 2 \"\": mass", |w| w.bodies[2].mass.mass = -1.0),
         ("body 2 \"\": friction", |w| w.bodies[2].material.friction = f32::NAN),

@@ -3,7 +3,7 @@
 use crate::common::state::joint_impulses;
 use drystone::config::JointSolver;
 use drystone::glam::Vec3;
-use drystone::{Body, Joint, Shape, Simulation, SolverConfig, World};
+use drystone::{Body, BodyHandle, Joint, Shape, Simulation, SolverConfig, World};
 
 use super::{BOTH, DT, cpu, cube, net, reference, run, simulation, standing};
 
@@ -21,8 +21,9 @@ fn joints_that_take_the_place_of_others_hold_what_they_tie() {
         let count = joints.len();
         joints.retain(|j| j.body_b.is_some());
         for corner in [0, 3] {
-            let at = simulation.world.bodies[corner + 12].position;
-            simulation.world.insert_joint(Joint::to_world(corner + 12, Vec3::ZERO, at));
+            let ball = simulation.world.bodies.handle(corner + 12).expect("a ball");
+            let at = simulation.world.bodies[ball].position;
+            simulation.world.insert_joint(Joint::to_world(ball, Vec3::ZERO, at));
         }
         assert_eq!(simulation.world.joints.len(), count);
         for step in 0..120 {
@@ -47,8 +48,9 @@ fn ends(solver: JointSolver) {
     let mut simulation = simulation(&standing(), &config, reference);
     run(&mut simulation, 120);
     // The top of a tower is held where it is.
-    let top = simulation.world.bodies[5].position;
-    let held = simulation.world.insert_joint(Joint::to_world(5, Vec3::ZERO, top));
+    let top = simulation.world.bodies.handle(5).expect("a cube");
+    let at = simulation.world.bodies[top].position;
+    let held = simulation.world.insert_joint(Joint::to_world(top, Vec3::ZERO, at));
     run(&mut simulation, 60);
     let mut before = joint_impulses(&simulation).to_vec();
     before.rotate_right(1);
@@ -93,7 +95,7 @@ fn a_changed_joint_wakes_what_it_held() {
     let config = SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3);
     let mut simulation = simulation(&standing(), &config, cpu);
     run(&mut simulation, 240);
-    let rod = 18;
+    let rod = simulation.world.bodies.handle(18).expect("a rod");
     assert!(simulation.is_asleep(rod), "the chain hangs still");
     simulation.world.joints.retain(|j| j.body_b.is_some());
     run(&mut simulation, 30);
@@ -113,7 +115,7 @@ fn a_changed_joint_wakes_only_what_it_holds() {
         world.insert_joint(Joint::new(upper, -0.75 * Vec3::Y, lower, 0.75 * Vec3::Y));
     }
     let mut simulation = simulation(&world, &config, cpu);
-    let asleep = |s: &Simulation| [0, 1, 2, 3].map(|i| s.is_asleep(i));
+    let asleep = |s: &Simulation| s.world.bodies.handles().map(|body| s.is_asleep(body)).collect::<Vec<_>>();
     run(&mut simulation, 300);
     assert_eq!(asleep(&simulation), [true; 4]);
     // An anchor that moves wakes its chain.
@@ -134,10 +136,10 @@ fn a_new_joint_wakes_both_of_its_bodies() {
     for swap in [false, true] {
         let mut simulation = simulation(&standing(), &config, cpu);
         run(&mut simulation, 240);
-        let (one, other) = (5, 10);
+        let [one, other] = [5, 10].map(|i| simulation.world.bodies.handle(i).expect("a cube"));
         assert!(simulation.is_asleep(one) && simulation.is_asleep(other));
         let [a, b] = if swap { [other, one] } else { [one, other] };
-        let at = |i: usize| simulation.world.bodies[i].position;
+        let at = |body: BodyHandle| simulation.world.bodies[body].position;
         let half = 0.5 * (at(b) - at(a));
         simulation.world.insert_joint(Joint::new(a, half, b, -half));
         run(&mut simulation, 1);

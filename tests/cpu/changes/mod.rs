@@ -7,7 +7,7 @@ mod settings;
 
 use crate::common::state::reference;
 use drystone::glam::{Quat, Vec3};
-use drystone::{Backend, Body, BodyKind, Cpu, Joint, Shape, Simulation, SolverConfig, World};
+use drystone::{Backend, Body, BodyHandle, BodyKind, Cpu, Joint, Shape, Simulation, SolverConfig, World};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -80,19 +80,17 @@ fn standing() -> World {
 fn net() -> World {
     let mut world = World::new();
     let ball = |x: u32, z: u32| Body::dynamic().shape(Shape::ball(0.2)).position(x as f32, 0.0, z as f32);
-    for i in 0..16 {
-        world.insert(ball(i % 4, i / 4));
-    }
+    let balls: Vec<BodyHandle> = (0..16).map(|i| world.insert(ball(i % 4, i / 4))).collect();
     let half = 0.5 * Vec3::X;
     for i in 0..16 {
         if i % 4 < 3 {
-            world.insert_joint(Joint::new(i, half, i + 1, -half));
+            world.insert_joint(Joint::new(balls[i], half, balls[i + 1], -half));
         }
         if i < 12 {
-            world.insert_joint(Joint::new(i, 0.5 * Vec3::Z, i + 4, -0.5 * Vec3::Z));
+            world.insert_joint(Joint::new(balls[i], 0.5 * Vec3::Z, balls[i + 4], -0.5 * Vec3::Z));
         }
     }
-    world.insert_joint(Joint::to_world(0, Vec3::ZERO, Vec3::ZERO));
-    world.insert_joint(Joint::to_world(3, Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)));
+    world.insert_joint(Joint::to_world(balls[0], Vec3::ZERO, Vec3::ZERO));
+    world.insert_joint(Joint::to_world(balls[3], Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)));
     world
 }

@@ -121,28 +121,29 @@ fn a_slope_is_slippery_from_the_step_on_in_which_friction_is_switched_off_and_ho
 fn bodies_may_fall_asleep_once_the_settings_say_so() {
     let mut simulation = simulation(&standing(), &SolverConfig::default().without_sleep(), cpu);
     run(&mut simulation, 120);
-    assert!(!(0..simulation.world.bodies.len()).any(|i| simulation.is_asleep(i)));
+    assert!(!simulation.world.bodies.handles().any(|body| simulation.is_asleep(body)));
+    let cube = simulation.world.bodies.handle(1).expect("a cube");
     let asleep = SolverConfig::default().without_sleep().with(|c| c.sleep_after = 0.3);
     simulation.set_config(asleep.clone()).expect("a setting");
     run(&mut simulation, 60);
-    assert!(simulation.is_asleep(1), "0.3 s of rest are over");
+    assert!(simulation.is_asleep(cube), "0.3 s of rest are over");
     simulation.set_config(asleep.clone().with(|c| c.sleep_speed = 1e-9)).expect("a setting");
-    simulation.world.bodies[1].linear_velocity.x = 1e-4;
+    simulation.world.bodies[cube].linear_velocity.x = 1e-4;
     run(&mut simulation, 60);
-    assert!(!simulation.is_asleep(1), "nothing is slower than 1e-9 m/s");
+    assert!(!simulation.is_asleep(cube), "nothing is slower than 1e-9 m/s");
     simulation.set_config(asleep).expect("a setting");
     run(&mut simulation, 60);
-    assert!(simulation.is_asleep(1));
+    assert!(simulation.is_asleep(cube));
     simulation.set_config(SolverConfig::default().without_sleep()).expect("a setting");
     run(&mut simulation, 1);
-    assert!(!simulation.is_asleep(1), "nothing sleeps any more");
+    assert!(!simulation.is_asleep(cube), "nothing sleeps any more");
 }
 
 #[test]
 fn a_setting_that_changes_wakes_what_sleeps() {
     let mut simulation = simulation(&standing(), &SolverConfig::default().with(|c| c.sleep_after = 0.3), cpu);
     run(&mut simulation, 240);
-    let block = 17;
+    let block = simulation.world.bodies.handle(17).expect("a block");
     assert!(simulation.is_asleep(block));
     let slippery = simulation.config().clone().with(|c| c.friction = Friction::None);
     simulation.set_config(slippery).expect("a setting");
@@ -157,15 +158,16 @@ fn what_was_changed_once_sleeps_again() {
     let config = SolverConfig::default().with(|c| c.sleep_after = 0.3);
     let mut simulation = simulation(&standing(), &config, cpu);
     run(&mut simulation, 240);
-    assert!(simulation.is_asleep(5));
-    simulation.world.bodies[5].mass.mass *= 1.5;
+    let top = simulation.world.bodies.handle(5).expect("a cube");
+    assert!(simulation.is_asleep(top));
+    simulation.world.bodies[top].mass.mass *= 1.5;
     run(&mut simulation, 1);
-    assert!(!simulation.is_asleep(5), "its mass changed");
+    assert!(!simulation.is_asleep(top), "its mass changed");
     run(&mut simulation, 120);
-    assert!(simulation.is_asleep(5), "its mass changed two seconds ago");
+    assert!(simulation.is_asleep(top), "its mass changed two seconds ago");
     simulation.set_config(config.with(|c| c.sleep_after = 0.4)).expect("a setting");
     run(&mut simulation, 1);
-    assert!(simulation.is_asleep(5), "only the time until bodies sleep changed");
+    assert!(simulation.is_asleep(top), "only the time until bodies sleep changed");
 }
 
 #[test]

@@ -62,7 +62,7 @@ fn kinds() -> World {
 /// speeds, rolling friction and added mass, which fall on each other.
 fn held() -> World {
     let mut world = World::new();
-    world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.8));
+    let floor = world.insert(Body::fixed().shape(Shape::half_space(Vec3::Y)).friction(0.8));
     let spin = Vec3::new(1.0, -2.0, 3.0);
     let cube = |x: f32, y: f32| Body::dynamic().shape(Shape::cuboid(0.3, 0.2, 0.25)).position(x, y, 0.1 * y);
     let damped = cube(0.0, 1.0).linear_damping(1.5).angular_damping(0.5);
@@ -79,7 +79,7 @@ fn held() -> World {
     for (k, x) in [-4.0, -6.0, -8.0, -10.0].into_iter().enumerate() {
         let anchor = Vec3::new(x, 3.0, 0.0);
         let body = world.insert(cube(x, 2.5).velocity(Vec3::X * 3.0, spin));
-        let joint = Joint::new(body, anchor, 0, anchor).in_world(&world);
+        let joint = Joint::new(body, anchor, floor, anchor).in_world(&world);
         world.insert_joint(match k {
             0 => joint.along(Vec3::Y),
             1 => joint.hinge(Vec3::Z).constant_load(200.0),
