@@ -231,6 +231,8 @@ impl Neighbors<'_> {
         let mut best: Option<(f32, Face)> = None;
         let nearest_dist = found.points.iter().map(|point| point.dist).fold(f32::INFINITY, f32::min);
         let is_exact = other.cuboid.is_some() || other.shape.as_ball().is_some();
+        // Parry's search stops too early on rims.
+        let has_rim = other.shape.as_cylinder().is_some() || other.shape.as_cone().is_some();
         let bend = if is_exact { 0.0 } else { other.size };
         for point in &found.points {
             let p = point.local_p1;
@@ -245,7 +247,8 @@ impl Neighbors<'_> {
             let away = solid.furthest(n) - p;
             let is_own_behind = is_behind((n.dot(away), away.length()));
             let is_other_behind = |c: &u32| is_behind(flush(c).beyond(n, p, (p, around), size));
-            if is_own_behind && near.iter().all(is_other_behind) {
+            let is_true = is_own_behind && near.iter().all(is_other_behind);
+            if is_true || near.is_empty() && !has_rim {
                 return false;
             }
             faces.clear();
