@@ -70,7 +70,7 @@ impl Joint {
         let (body_a, body_b) = (of(self.body_a)?, self.body_b.map(of).transpose()?);
         // Two bodies whose only joint this is.
         let mut alone = Bodies::new();
-        let [a, b] = [0; 2].map(|_| alone.insert(Body::fixed()));
+        let [a, b] = [(); 2].map(|()| alone.insert(Body::fixed()));
         let other = |entity| if entity == self.body_a { a } else { b };
         alone.insert_joint(drystone::Joint { body_a: a, body_b: self.body_b.map(other), ..self.settings });
         alone.check_joints().map_err(|error| error.to_string().replacen("joint 0: ", "", 1))?;

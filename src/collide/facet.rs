@@ -74,17 +74,8 @@ pub(super) fn composite_contacts(
             let is_open = cone.as_ref().is_some_and(|cone| ball_opens(facet, triangle, cone, middle, beside, buffers));
             let cone = cone.as_ref().filter(|_| !is_open);
             ask((triangle, shape), pos12, cone.map(|cone| cone as &dyn NormalConstraints), search, &mut found);
-            let lost = cone.filter(|_| found.points.is_empty()).zip(shape.as_ball());
-            if let Some((cone, ball)) = lost {
-                found.points.extend(ball_at_edge(
-                    triangle,
-                    cone,
-                    (ball.radius, pos12),
-                    beside.around,
-                    &mut found.local_n1,
-                ));
-                found.points.retain(|point| point.dist <= search.prediction);
-                found.local_n2 = pos12.rotation.inverse() * -found.local_n1;
+            if let (true, Some(cone)) = (found.points.is_empty(), cone) {
+                ball_at_edge(triangle, cone, (shape, pos12), beside.around, search, &mut found);
             }
         }
         if !found.points.is_empty() {
@@ -93,26 +84,31 @@ pub(super) fn composite_contacts(
     });
 }
 
-/// The contact of a ball whose center is above an edge of a triangle, or beside it by no more than `around` (m), along the
-/// normal that the cone allows. Parry casts a ray along that normal, which misses the triangle by rounding: a ball on
-/// the seam of two meshes fell through.
+/// Adds the contact of a ball whose center is above an edge of a triangle, or beside it by no more than `around` (m),
+/// along the normal that the cone allows. Parry casts a ray along that normal, which misses the triangle by rounding: a
+/// ball on the seam of two meshes fell through.
 fn ball_at_edge(
     triangle: &Triangle,
     cone: &FacetCone,
-    (radius, pos12): (f32, &Pose),
+    (ball, pos12): (&dyn Shape, &Pose),
     around: f32,
-    normal: &mut Vec3,
-) -> Option<TrackedContact<()>> {
+    ContactQuery { prediction, .. }: ContactQuery,
+    found: &mut ParryManifold,
+) {
+    let Some(radius) = ball.as_ball().map(|ball| ball.radius) else { return };
     let on = triangle.project_local_point(pos12.translation, false).point;
     let away = pos12.translation - on;
-    *normal = away.try_normalize()?;
-    let is_in_front = cone.project_local_normal_mut(normal);
+    let Some(mut normal) = away.try_normalize().filter(|_| away.length() <= radius + prediction + around) else {
+        return;
+    };
+    let is_in_front = cone.project_local_normal_mut(&mut normal);
     let height = normal.dot(away);
-    let below = pos12.translation - height * *normal;
-    let on_ball = pos12.rotation.inverse() * *normal * -radius;
-    let unknown = PackedFeatureId::UNKNOWN;
-    let is_above = is_in_front && below.distance(on) <= around;
-    is_above.then(|| TrackedContact::new(below, on_ball, unknown, unknown, height - radius))
+    let below = pos12.translation - height * normal;
+    if is_in_front && below.distance(on) <= around && height - radius <= prediction {
+        (found.local_n1, found.local_n2) = (normal, pos12.rotation.inverse() * -normal);
+        let (on_ball, unknown) = (found.local_n2 * radius, PackedFeatureId::UNKNOWN);
+        found.points.push(TrackedContact::new(below, on_ball, unknown, unknown, height - radius));
+    }
 }
 
 /// Whether a ball at `center` may touch a triangle along the line from its nearest point, which the closed cone turns.

@@ -16,7 +16,7 @@ use super::cone::nearest;
 use super::pair::{Side, pose};
 use super::query::{TRUE, flip, flush_contact};
 use super::rim::{each_triangle, goes_on};
-use super::solid::{ClipBuffers, ContactQuery, EXACT, ParryManifold, Solid};
+use super::solid::{ClipBuffers, ContactQuery, EXACT, ParryManifold, Solid, has_rim};
 use super::tree::Tree;
 use super::world_contacts::{DetectionInput, Plane, key};
 use crate::world::{BodyKind, seen_from};
@@ -231,8 +231,7 @@ impl Neighbors<'_> {
         let mut best: Option<(f32, Face)> = None;
         let nearest_dist = found.points.iter().map(|point| point.dist).fold(f32::INFINITY, f32::min);
         let is_exact = other.cuboid.is_some() || other.shape.as_ball().is_some();
-        // Parry's search stops too early on rims.
-        let has_rim = other.shape.as_cylinder().is_some() || other.shape.as_cone().is_some();
+        let has_rim = has_rim(&*other.shape);
         let bend = if is_exact { 0.0 } else { other.size };
         for point in &found.points {
             let p = point.local_p1;

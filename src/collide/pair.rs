@@ -238,7 +238,9 @@ impl Pair {
             // Coincident centers give no direction. Up is finite, and as good as any other.
             let normal = (pose_a.rotation * normal_a).try_normalize().unwrap_or(Vec3::Y);
             candidates.clear();
-            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, normal, sides, prediction)));
+            let lines = [side_line(ca, pose_a, normal), side_line(cb, pose_b, -normal)];
+            let on_side = move |p1, p2| on_side(lines, [pose_a, pose_b], [p1, p2]);
+            candidates.extend(m.points.iter().filter_map(|p| candidate(m, p, normal, sides, prediction, on_side)));
             if candidates.is_empty() {
                 continue;
             }
@@ -275,20 +277,14 @@ fn candidate(
     normal: Vec3,
     [(ca, a), (cb, b)]: [Side; 2],
     prediction: f32,
+    on_side: impl Fn(Vec3, Vec3) -> [Vec3; 2],
 ) -> Option<ManifoldPoint> {
     if p.dist > prediction {
         return None;
     }
     let p1 = m.subshape_pos1().map_or(p.local_p1, |pose| pose * p.local_p1);
     let p2 = m.subshape_pos2().map_or(p.local_p2, |pose| pose * p.local_p2);
-    let [on_side_a, on_side_b] = [(ca, a, p1, normal), (cb, b, p2, -normal)].map(|(c, body, p, out)| {
-        let turn = pose((c, body)).rotation;
-        to_side(c, turn.inverse() * out, p).map(|way| turn * way)
-    });
-    let moved = |own: Option<Vec3>, other: Option<Vec3>, (c, body): Side| {
-        own.or(other).map_or(Vec3::ZERO, |way| pose((c, body)).rotation.inverse() * way)
-    };
-    let (p1, p2) = (p1 + moved(on_side_a, on_side_b, (ca, a)), p2 + moved(on_side_b, on_side_a, (cb, b)));
+    let [p1, p2] = on_side(p1, p2);
     let (anchor_a, anchor_b) = (ca.local * p1, cb.local * p2);
     // Arms to the point midway between overlapping surfaces. Surfaces apart push each other when they meet, so each arm
     // leads to its own surface then. Subtract the centers first: the differences are small.
@@ -307,13 +303,29 @@ fn candidate(
     })
 }
 
-/// The way from a point to the line on the side of a cylinder where its surface has this outward normal, in the frame
-/// of the shape (m). `None` for other surfaces. Parry's points lie up to 0.3 % of the radius beside that line, where the
-/// spin of a cylinder that rolls would lift it.
-fn to_side(c: &ColliderInfo, normal: Vec3, p: Vec3) -> Option<Vec3> {
-    let cylinder = c.shape.as_cylinder().filter(|_| c.cuboid.is_none() && is_across(normal))?;
-    let out = cylinder.radius * Vec3::new(normal.x, 0.0, normal.z).normalize();
-    Some(Vec3::new(out.x - p.x, 0.0, out.z - p.z))
+/// The place of the line on the side of a cylinder where its surface has the outward normal `out` of the world, from the
+/// axis of the cylinder in its own frame (m). `None` for other surfaces.
+fn side_line(c: &ColliderInfo, pose: Pose, out: Vec3) -> Option<Vec3> {
+    if c.cuboid.is_some() {
+        return None;
+    }
+    let cylinder = c.shape.as_cylinder()?;
+    let own = pose.rotation.inverse() * out;
+    is_across(own).then(|| cylinder.radius * Vec3::new(own.x, 0.0, own.z).normalize())
+}
+
+/// Moves the points of a contact, each in the frame of its collider, to these lines. Parry's points lie up to 0.3 % of
+/// the radius beside them, where the spin of a cylinder that rolls would lift it.
+fn on_side(lines: [Option<Vec3>; 2], poses: [Pose; 2], points: [Vec3; 2]) -> [Vec3; 2] {
+    let ways = [0, 1].map(|i| {
+        let line = lines[i]?;
+        Some(poses[i].rotation * Vec3::new(line.x - points[i].x, 0.0, line.z - points[i].z))
+    });
+    let moved = |i: usize| match ways[i].or(ways[1 - i]) {
+        Some(way) => points[i] + poses[i].rotation.inverse() * way,
+        None => points[i],
+    };
+    [moved(0), moved(1)]
 }
 
 /// Whether a cylinder touches with its side along a normal in its own frame.

@@ -8,7 +8,9 @@ use parry3d::shape::{PackedFeatureId, SharedShape};
 
 use super::ascent::ascend;
 use super::facet::half_space_contact;
-use super::solid::{ClipBuffers, ContactQuery, DEEP, EXACT, PUSH, ParryManifold, Solid, add_above, ask, clip_to};
+use super::solid::{
+    ClipBuffers, ContactQuery, DEEP, EXACT, PUSH, ParryManifold, Solid, add_above, ask, clip_to, has_rim,
+};
 
 /// Largest error of a distance along its normal, relative to the smallest half extent of the thinner shape.
 pub(super) const TRUE: f32 = 0.01;
@@ -54,9 +56,7 @@ pub(super) fn convex_contact(
     };
     let mut best = along(found.local_n1);
     let mut found_is_true = is_true(&found, best);
-    // Parry's other points of a round rim can lie on its far side.
-    let is_round = |shape: &SharedShape| shape.as_cone().is_some() || shape.as_cylinder().is_some();
-    let rims = is_round(a) || is_round(b);
+    let rims = has_rim(&**a) || has_rim(&**b);
     if found_is_true && best > -DEEP * size && (found.points.is_empty() || !rims) {
         return found;
     }
@@ -115,7 +115,6 @@ pub(super) fn convex_contact(
     if !rims {
         return found;
     }
-    // Parry's search stops too early on rims.
     let (distance, d) = ascend(found.local_n1.normalize_or(Vec3::Y), EXACT * size, gap);
     let is_as_far = |found: &ParryManifold| (deepest(found) - distance).abs() < RIM * size;
     if distance > prediction {

@@ -260,6 +260,11 @@ impl<'a> Solid<'a> {
     }
 }
 
+/// Whether a shape has a round rim. Parry's search stops too early on rims, and its other points can lie on the far side.
+pub(super) fn has_rim(shape: &dyn Shape) -> bool {
+    shape.as_cylinder().is_some() || shape.as_cone().is_some()
+}
+
 /// The core that a shape touches with, and its rounding radius. For a ball parry needs a search only beside a hull.
 fn features(shape: &dyn Shape, has_hull: bool) -> Option<(&dyn PolygonalFeatureMap, f32)> {
     let ball = shape.as_ball().filter(|_| has_hull).map(|ball| (&Point as &dyn PolygonalFeatureMap, ball.radius));

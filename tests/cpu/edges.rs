@@ -5,7 +5,6 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use drystone::glam::{IVec3, Quat, Vec3};
 use drystone::stages::random::SplitMix64;
 use drystone::{Body, BodyHandle, Cpu, Groups, Shape, Simulation, SolverConfig, World};
-
 use rayon::prelude::*;
 
 use crate::common::sample::is_full;
